@@ -1,0 +1,208 @@
+"""Plots as SVG text. Pure; text colour is inherited, so that they read on a light and a dark page.
+
+SVG and not the built-in uPlot: Fig. 4 needs a square with one scale for both axes, filled
+wedges, a vertical line and a ring, all of which uPlot has no word for.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photolin.factors import LETTERS, PALETTE, TITLES, Factor, Thresholds
+
+from .readout import escape
+
+Point = tuple[float, float]
+
+LEFT, TOP, RIGHT, BOTTOM = 40, 22, 16, 36
+"""Margins around the square, in the units of the drawing (pixels at its natural size)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PixelPanel:
+    """The K observations of one pixel by one method."""
+
+    title: str
+    """Heading, as the method's name."""
+    i: NDArray[np.float32]
+    """(K,) input, fraction of full scale."""
+    l: NDArray[np.float32]  # noqa: E741
+    """(K,) linearized (signed), fraction of full scale; NaN is left out."""
+    labels: NDArray[np.uint8]
+    """(K,) Factor codes."""
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """One range for both axes, and the side of the square it fills."""
+
+    low: float
+    high: float
+    side: int
+
+    def at(self, i: float, l: float) -> Point:  # noqa: E741
+        """Drawing coordinates of (i, l) from the square's upper left corner."""
+        unit = self.side / (self.high - self.low)
+        return round((i - self.low) * unit, 2), round((self.high - l) * unit, 2)
+
+
+def plot_pixel(
+    panels: Sequence[PixelPanel], thresholds: Thresholds, current: int, names: Sequence[str]
+) -> str:
+    """Input against linearized intensity of one pixel (Fig. 4), methods side by side (Fig. 9).
+
+    Args:
+        panels: one for each method; all share one range of the axes.
+        thresholds: T and Ts, which draw the regions.
+        current: image number, from 0, whose dot is larger and ringed.
+        names: K image names, for the dots' tooltips; any text.
+
+    Returns:
+        HTML holding one SVG for each panel, without scripts, names escaped.
+    """
+    axes = _choose_axes(panels, thresholds.Ts)
+    drawings = "".join(_draw(panel, axes, thresholds, current, names) for panel in panels)
+    return (
+        '<div style="display:grid;gap:4px;'
+        f'grid-template-columns:repeat(auto-fit,minmax(150px,1fr))">{drawings}</div>'
+    )
+
+
+def _choose_axes(panels: Sequence[PixelPanel], Ts: float) -> _Axes:
+    """Hold every dot, unless l is far outside the range of i: such dots go to the border."""
+    i = np.concatenate([panel.i for panel in panels])
+    l = np.concatenate([panel.l for panel in panels])  # noqa: E741
+    bright = max(float(i.max()), 2 * Ts, 1e-3)
+    l = l[np.isfinite(l)].clip(-bright, 1.5 * bright)  # noqa: E741
+    high = 1.06 * max(bright, float(l.max(initial=0)))
+    low = min(float(l.min(initial=0)) - 0.08 * high, -0.14 * high)
+    return _Axes(low, high, side=260 if len(panels) == 1 else 150)
+
+
+def _draw(
+    panel: PixelPanel, axes: _Axes, thresholds: Thresholds, current: int, names: Sequence[str]
+) -> str:
+    width, height = LEFT + axes.side + RIGHT, TOP + axes.side + BOTTOM
+    inner = (
+        _regions(axes, thresholds) + _lines(axes, thresholds) + _dots(panel, axes, current, names)
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="100%" '
+        'role="img" fill="currentColor" font-family="system-ui,sans-serif" font-size="11" '
+        f'style="max-width:{2 * width}px;display:block">'
+        f'<text x="{LEFT}" y="14" font-weight="600">{escape(panel.title)}</text>'
+        f'<svg x="{LEFT}" y="{TOP}" width="{axes.side}" height="{axes.side}">{inner}</svg>'
+        f"{_frame(axes)}</svg>"
+    )
+
+
+def _regions(axes: _Axes, thresholds: Thresholds) -> str:
+    """The classes of Eq. (3) as areas, each with its letter; the square clips what sticks out."""
+    low, high, far = axes.low, axes.high, 3 * axes.high
+    T, Ts = thresholds.T, thresholds.Ts
+    upper, lower = 1 + T, 1 - T
+    wedge_end = [(high, lower * high), (Ts, lower * Ts)]
+    areas: list[tuple[Factor, list[Point]]] = [
+        (Factor.ATTACHED, [(low, low), (Ts, low), (Ts, 0), (low, 0)]),
+        (Factor.CAST, [(low, 0), (Ts, 0), (Ts, far), (low, far)]),
+        (Factor.DIFFUSE, [(Ts, upper * Ts), (high, upper * high), *wedge_end]),
+        (Factor.SPECULAR, [(Ts, 0), (high, 0), *wedge_end]),
+        (Factor.UNDEFINED, [(Ts, upper * Ts), (high, upper * high), (high, far), (Ts, far)]),
+        (Factor.UNDEFINED, [(Ts, low), (high, low), (high, 0), (Ts, 0)]),
+    ]
+    middle, dark = (Ts + high) / 2, (low + Ts) / 2
+    letters: list[tuple[Factor, Point]] = [
+        (Factor.ATTACHED, (dark, low / 2)),
+        (Factor.CAST, (dark, high / 2)),
+        (Factor.SPECULAR, (0.75 * high, lower * 0.35 * high)),
+        (Factor.UNDEFINED, (Ts + 0.2 * (high - Ts), 0.8 * high)),
+        (Factor.UNDEFINED, (middle, low / 2)),
+    ]
+    fills = "".join(
+        f'<polygon points="{_points(axes, area)}" fill="{_colour(factor)}" fill-opacity="0.12"/>'
+        for factor, area in areas
+    )
+    texts = "".join(
+        '<text x="{}" y="{}" text-anchor="middle" dominant-baseline="central" font-weight="600" '
+        'fill="{}">{}</text>'.format(*axes.at(*place), _colour(factor), LETTERS[factor])
+        for factor, place in letters
+    )
+    return fills + texts
+
+
+def _lines(axes: _Axes, thresholds: Thresholds) -> str:
+    low, high, T, Ts = axes.low, axes.high, thresholds.T, thresholds.Ts
+    lines: list[tuple[str, Point, Point]] = [
+        ('stroke-opacity="0.35"', (low, low), (high, high)),
+        ('stroke-opacity="0.5"', (low, 0), (high, 0)),
+        ('stroke-dasharray="4 3"', (Ts, low), (Ts, high)),
+        (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 - T) * Ts), (high, (1 - T) * high)),
+        (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 + T) * Ts), (high, (1 + T) * high)),
+    ]
+    drawn = "".join(
+        '<line x1="{}" y1="{}" x2="{}" y2="{}" {}/>'.format(*axes.at(*a), *axes.at(*b), look)
+        for look, a, b in lines
+    )
+    return f'<g stroke="currentColor" stroke-width="1">{drawn}</g>'
+
+
+def _dots(panel: PixelPanel, axes: _Axes, current: int, names: Sequence[str]) -> str:
+    """One dot for each image, the current one last (on top), larger and ringed."""
+    drawn = [k for k in range(len(panel.i)) if np.isfinite(panel.l[k])]
+    drawn.sort(key=lambda k: k == current)
+    return "".join(_dot(panel, k, axes, names[k], ringed=k == current) for k in drawn)
+
+
+def _dot(panel: PixelPanel, k: int, axes: _Axes, name: str, *, ringed: bool) -> str:
+    i, l, factor = float(panel.i[k]), float(panel.l[k]), Factor(int(panel.labels[k]))  # noqa: E741
+    x, y = axes.at(i, min(max(l, axes.low), axes.high))
+    ring = f'<circle cx="{x}" cy="{y}" r="9" fill="none" stroke="currentColor" stroke-width="2"/>'
+    return (
+        f"<g><title>{escape(f'{name}: i {i:.3f}, l {l:z.3f}, {TITLES[factor]}')}</title>"
+        f"{ring if ringed else ''}"
+        f'<circle cx="{x}" cy="{y}" r="{5 if ringed else 3.2}" fill="{_colour(factor)}" '
+        'stroke="currentColor" stroke-width="0.6"/></g>'
+    )
+
+
+def _frame(axes: _Axes) -> str:
+    """Border, ticks and names of the axes, and the letter of the wedge, too thin to hold one."""
+    side = axes.side
+    parts = [
+        f'<rect x="{LEFT}" y="{TOP}" width="{side}" height="{side}" fill="none" '
+        'stroke="currentColor" stroke-opacity="0.5"/>'
+        f'<text x="{LEFT + side + 4}" y="{TOP + 9}" font-weight="600" '
+        f'fill="{_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
+    ]
+    for value in _ticks(axes):
+        x, y = axes.at(value, value)
+        parts.append(
+            f'<text x="{LEFT + x:g}" y="{TOP + side + 14}" text-anchor="middle">{value:g}</text>'
+            f'<text x="{LEFT - 5}" y="{TOP + y + 4:g}" text-anchor="end">{value:g}</text>'
+        )
+    parts.append(
+        f'<text x="{LEFT + side / 2:g}" y="{TOP + side + 30}" text-anchor="middle">'
+        "input i (of full scale)</text>"
+        f'<text transform="translate(10 {TOP + side / 2:g}) rotate(-90)" text-anchor="middle">'
+        "linearized l (of full scale)</text>"
+    )
+    return "".join(parts)
+
+
+def _ticks(axes: _Axes) -> list[float]:
+    """Three to seven round numbers inside the range."""
+    span = axes.high - axes.low
+    power = 10.0 ** np.floor(np.log10(span / 3))
+    step = max(s * power for s in (1, 2, 5) if s * power <= span / 3)
+    numbers = range(int(np.ceil(axes.low / step)), int(np.floor(axes.high / step)) + 1)
+    return [round(n * step, 10) for n in numbers]
+
+
+def _points(axes: _Axes, corners: Sequence[Point]) -> str:
+    return " ".join("{},{}".format(*axes.at(*corner)) for corner in corners)
+
+
+def _colour(factor: Factor) -> str:
+    return "#{:02X}{:02X}{:02X}".format(*PALETTE[factor])

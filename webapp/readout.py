@@ -1,0 +1,152 @@
+"""The sentences of the inspector. Pure; plain text, to be passed through `escape` into markup.
+
+Intensities are fractions of full scale, with three decimals; more where three would hide why
+a comparison came out as it did.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photolin.analysis import Analysis
+from photolin.factors import LETTERS, OUTSIDE, TITLES, Factor, Thresholds, classify
+
+
+@dataclass(frozen=True)
+class LegendRow:
+    """One class of one label map."""
+
+    factor: Factor
+    letter: str
+    title: str
+    count: int
+    """Pixels of this class."""
+    percent: float
+    """Of the pixels inside the mask, 0 to 100."""
+
+
+def escape(text: str) -> str:
+    """`text` for HTML or Markdown: all but letters, digits and spaces as character codes."""
+    return re.sub(r"[^\w ]|_", lambda match: f"&#{ord(match[0])};", text)
+
+
+def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:  # noqa: E741
+    """The rule of Eq. (3) that decided one observation, with its numbers.
+
+    Args:
+        i: input intensity, fraction of full scale.
+        l: linearized intensity (signed), fraction of full scale; NaN where it is unknown.
+        thresholds: T and Ts.
+        name: what the image is called, as "Image 07".
+    """
+    factor = Factor(int(classify(i, l, thresholds)))
+    if not np.isfinite(l):
+        return f"{name}: i {_number(i)} of full scale; l could not be determined: undefined."
+    i, l, T, Ts = (float(np.float32(v)) for v in (i, l, thresholds.T, thresholds.Ts))  # noqa: E741
+    observed = f"{name}: i {_number(i)}, l {_number(l)} of full scale."
+    lit, level = _apart(i, Ts)
+    if i < Ts:
+        facing, reason = (
+            ("l ≤ 0", "the surface faces away from the light")
+            if factor is Factor.ATTACHED
+            else ("l > 0", "the surface faces the light; something blocks it")
+        )
+        return f"{observed} i = {lit} < Ts = {level} and {facing}: {TITLES[factor]} ({reason})."
+    return f"{observed} i = {lit} ≥ Ts = {level} and {_lit_rule(factor, i, l, T)}."
+
+
+def _lit_rule(factor: Factor, i: float, l: float, T: float) -> str:  # noqa: E741
+    distance, slack = _apart(abs(i - l), T * i)
+    if factor is Factor.DIFFUSE:
+        return f"|i - l| = {distance} ≤ T·i = {slack}: diffuse"
+    if factor is Factor.SPECULAR:
+        return (
+            f"i - l = {distance} > T·i = {slack} with l ≥ 0: "
+            "specular (light is added to what the surface scatters)"
+        )
+    if l > i:
+        return (
+            f"l - i = {distance} > T·i = {slack}: undefined (lit, but below the fit; light can be "
+            "added to a lit pixel, not taken from it, so l or T is wrong here)"
+        )
+    return (
+        f"l = {_number(l)} < 0: undefined (lit, although the fit says the surface faces away "
+        "from the light, so l or Ts is wrong here)"
+    )
+
+
+def describe_pixel(
+    row: int, column: int, i: NDArray[np.float32], thresholds: Thresholds, *, inside: bool = True
+) -> str:
+    """In how many of the K images (`i` is (K,)) a pixel is lit, and what follows from it."""
+    where = f"Pixel (row {row}, column {column})"
+    if not inside:
+        return f"{where} lies outside the mask: nothing was computed there."
+    lit = int(np.count_nonzero(np.asarray(i, np.float32) >= np.float32(thresholds.Ts)))
+    sentence = f"{where} is lit (i ≥ Ts = {_number(thresholds.Ts)}) in {lit} of {len(i)} images"
+    if lit < 3:
+        return f"{sentence}: its linearized value cannot be determined."
+    return f"{sentence}."
+
+
+def status_line(row: int, column: int, i: float, l: float, label: int) -> str:  # noqa: E741
+    """Values under the pointer, in one line; fractions of full scale."""
+    if label == OUTSIDE:
+        return f"row {row}  column {column}  i {i:.3f}  outside the mask"
+    return (
+        f"row {row}  column {column}  i {i:.3f}  l {l:z.3f}  residual {i - l:+z.3f}  "
+        f"{LETTERS[Factor(label)]}"
+    )
+
+
+def legend(labels: NDArray[np.uint8]) -> tuple[LegendRow, ...]:
+    """Count and share of each class of a label map (H,W) or (K,H,W), in the legend's order."""
+    inside = int(np.count_nonzero(labels != OUTSIDE))
+    counts = {factor: int(np.count_nonzero(labels == factor)) for factor in LETTERS}
+    return tuple(
+        LegendRow(
+            factor, letter, TITLES[factor], counts[factor], 100 * counts[factor] / max(inside, 1)
+        )
+        for factor, letter in LETTERS.items()
+    )
+
+
+def threshold_status(shown: Thresholds, used: Thresholds | None) -> str:
+    """Whether the linearized bases (computed with `used`) belong to the thresholds shown."""
+    if used is None:
+        return "Nothing is linearized yet."
+    T, T_used = _apart(shown.T, used.T)
+    Ts, Ts_used = _apart(shown.Ts, used.Ts)
+    if shown == used:
+        return f"Labels and linearized bases: T {T}, Ts {Ts}."
+    return (
+        f"Labels: T {T}, Ts {Ts}. Linearized bases: T {T_used}, Ts {Ts_used}; "
+        "run again to compute them with the present thresholds."
+    )
+
+
+def summarize(analysis: Analysis) -> str:
+    """One run in one sentence: method, size, bases, thresholds, time."""
+    K, H, W = analysis.labels.shape
+    bases = ", ".join(analysis.names[k] for k in analysis.base_images)
+    count = int(np.count_nonzero(analysis.mask))
+    return (
+        f"{analysis.options.method}: {K} images of {W} x {H}, {count} pixels in the mask, "
+        f"base images {bases}, T {_number(analysis.thresholds.T)}, "
+        f"Ts {_number(analysis.thresholds.Ts)}, {analysis.seconds['total']:.2f} s."
+    )
+
+
+def _number(value: float) -> str:
+    """Three decimals; a value that would read as zero and is not, in scientific notation."""
+    return f"{value:.1e}" if 0 < abs(value) < 0.0005 else f"{value:z.3f}"
+
+
+def _apart(a: float, b: float) -> tuple[str, str]:
+    """Both numbers with as many decimals, 3 to 8, as it takes to tell them apart."""
+    decimals = 3
+    while f"{a:z.{decimals}f}" == f"{b:z.{decimals}f}" and a != b and decimals < 8:
+        decimals += 1
+    return f"{a:z.{decimals}f}", f"{b:z.{decimals}f}"

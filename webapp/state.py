@@ -1,0 +1,55 @@
+"""What one tab shows: scalars only, so that two states can be compared and kept for undo."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from photolin.analysis import METHODS, Method
+from photolin.errors import OptionError
+from photolin.factors import Factor, Thresholds
+
+Layer = Literal["input", "linearized", "residual", "labels"]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
+
+
+@dataclass(frozen=True)
+class ViewState:
+    """One view of a stack and its results; a change makes a new one (`dataclasses.replace`)."""
+
+    image: int = 0
+    """Image number, from 0."""
+    layer: Layer = "input"
+    """The picture under the overlay; labels: the label map alone, opaque."""
+    method: Method = "robust"
+    """Whose result is shown."""
+    T: float = 0.05
+    """Relative tolerance of i = l, unitless, in (0, 1]."""
+    Ts: float = 0.02
+    """Shadow level, fraction of full scale, in [0, 1)."""
+    opacity: float = 0.55
+    """Of the overlay, in [0, 1]."""
+    shown: frozenset[Factor] = frozenset(Factor)
+    """Classes drawn in the overlay."""
+    outlines: bool = False
+    """Draw the borders of the classes in place of their areas."""
+    pixel: tuple[int, int] | None = None
+    """(row, column) of the selected pixel."""
+    gain: float | None = None
+    """Display factor of input images, above 0; None means chosen from the stack."""
+
+    def __post_init__(self) -> None:
+        Thresholds(self.T, self.Ts)
+        if self.image < 0:
+            raise OptionError(f"image is {self.image}; accepted is a number from 0")
+        if self.layer not in LAYERS:
+            raise OptionError(f"layer is {self.layer!r}; accepted are {', '.join(LAYERS)}")
+        if self.method not in METHODS:
+            raise OptionError(f"method is {self.method!r}; accepted are {', '.join(METHODS)}")
+        if not 0 <= self.opacity <= 1:
+            raise OptionError(f"opacity is {self.opacity:g}; accepted is 0 to 1")
+        if self.gain is not None and not 0 < self.gain < float("inf"):
+            raise OptionError(f"gain is {self.gain:g}; accepted is a number above 0")
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """T and Ts as the backend takes them."""
+        return Thresholds(self.T, self.Ts)
