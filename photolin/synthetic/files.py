@@ -3,31 +3,37 @@
 import os
 import shutil
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..factors import LETTERS
+from ..factors import LETTERS, OUTSIDE
 from .render import Scene, Truth
 
 KEYS = tuple(Truth.__dataclass_fields__)
 """The arrays of gt.npz, named as the fields of Truth."""
 
-README = """{title}: a rendered image stack with exact ground truth (photolin.synthetic).
-{K} images of {H} x {W} pixels (rows x columns), {px_mm:g} mm/px, orthographic camera, one distant light each.
+UNREADABLE = (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error)
+"""What numpy raises for a truncated, damaged, pickled or other file."""
+
+README = """{title}: a rendered image stack with exact ground truth (photolin.synthetic)
+{K} images of {H} x {W} pixels (rows x columns), {px_mm:g} mm a pixel; orthographic camera, one
+distant light for each image.
 
 images/   {bits}-bit linear gray PNG; value / {full} = fraction of full scale
 mask.png  the object's pixels (255), where the mask is not the whole picture
-gt.npz    labels   (K,H,W) uint8: 1 diffuse, 2 specular (highlight > 0.5 % of full scale and > 2 % of
-                   diffuse), 3 attached shadow (n.s <= 0), 4 cast shadow (n.s > 0, occluded), 255 outside
-          ideal    (K,H,W) float32: albedo * power * (n.s), signed, not clipped; 1 = full scale
-          normals  (H,W,3) float32 unit;  albedo (H,W);  depth (H,W) z in mm, NaN outside the mask
-          lights   (K,3) unit, towards the light;  power (K,);  mask (H,W) bool;  px_mm
+gt.npz    labels   (K,H,W) uint8: 1 diffuse; 2 specular (highlight above 0.5 % of full scale and 2 %
+                   of the diffuse part); 3 attached shadow (n.s <= 0); 4 cast shadow (n.s > 0,
+                   occluded); 255 outside the mask
+          ideal    (K,H,W) albedo * power * (n.s), signed, not clipped; 1 = full scale
+          normals  (H,W,3) unit;  albedo (H,W);  depth (H,W) z in mm, NaN outside the mask
+          lights   (K,3) unit, towards the light;  power (K,);  mask (H,W);  px_mm
 axes      x right, y up (the row decreases), z to the camera;
           x = (column + .5 - W/2) * px_mm, y = (H/2 - row - .5) * px_mm
-model     image = min(1, (albedo * power * max(0, n.s) + highlight) * visible); shadows are black
-share of labels, percent of mask pixels over all images: {shares}
+model     image = min(1, (albedo * power * max(0, n.s) + highlight) * visible)
+labels    {shares} (percent of the mask's pixels, all images)
 """
 
 
@@ -95,10 +101,8 @@ def load_truth(path: str | os.PathLike[str]) -> Truth:
         with np.load(path, allow_pickle=False) as stored:
             missing = [key for key in KEYS if key not in stored]
             arrays = {key: stored[key] for key in KEYS if key in stored}
-    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: cannot be read as ground truth; a gt.npz is accepted"
-        ) from error
+    except UNREADABLE as error:
+        raise InputError(f"{path}: cannot be read as ground truth; a gt.npz is accepted") from error
     if missing:
         raise InputError(f"{path}: has no {', '.join(missing)}; accepted are {', '.join(KEYS)}")
     return _check_truth(arrays, path)
@@ -126,5 +130,5 @@ def _check_truth(arrays: dict[str, np.ndarray], path: Path) -> Truth:
                 f"numbers of shape {shape}, to fit the labels, are accepted"
             )
         arrays[key] = arrays[key].astype(dtype)
-    arrays["labels"][:, ~arrays["mask"]] = 255
-    return Truth(**arrays | {"px_mm": float(arrays["px_mm"])})
+    arrays["labels"][:, ~arrays["mask"]] = OUTSIDE
+    return Truth(px_mm=float(arrays.pop("px_mm")), **arrays)

@@ -10,6 +10,8 @@ from .shapes import Block, Floats, Ring, Shape, Vector, cone, lathe, pole, spher
 Texture = Callable[[Floats], Floats]
 """Albedo (P,) at points (P,3)."""
 
+GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -58,13 +60,13 @@ def place_lights(setup: Setup, count: int) -> tuple[Floats, Floats]:
     Returns:
         (count,3) unit directions towards the lights, camera frame, and (count,) powers.
     """
-    # multiples of these three irrationals are the R3 low-discrepancy sequence (Roberts 2018)
-    steps = 1.2207440846057596 ** -np.arange(1, 4)
-    u, v, w = (0.5 + np.arange(1, 8 * count + 1)[:, None] * steps).T % 1
+    k = np.arange(8 * count)[:, None]
+    # multiples of irrational numbers never cluster, however many are taken
+    u, v, w = (0.5 + k * (GOLDEN_RATIO, np.sqrt(2), np.sqrt(3))).T % 1
     low, high = np.sin(np.radians(setup.elevations))
-    z = low + u * (high - low)
+    z = low + v * (high - low)
     r = np.sqrt(1 - z**2)
-    directions = np.stack((r * np.cos(2 * np.pi * v), r * np.sin(2 * np.pi * v), z), axis=1)
+    directions = np.stack((r * np.cos(2 * np.pi * u), r * np.sin(2 * np.pi * u), z), axis=1)
     up = camera(setup.tilt) @ (0, 1, 0)
     allowed = np.flatnonzero(directions @ up >= setup.clearance)[:count]
     weak, strong = setup.power
@@ -72,85 +74,92 @@ def place_lights(setup: Setup, count: int) -> tuple[Floats, Floats]:
 
 
 def veins(dark: float, light: float, size: float) -> Texture:
-    """Marble: albedo between `dark` and `light`, features of about `size` mm."""
+    """Marble: albedo between `dark` and `light`, veins about `size` mm apart."""
+    waves = np.random.default_rng(1).normal(size=(5, 3)) / size
 
     def texture(points: Floats) -> Floats:
-        waves = np.random.default_rng(1).normal(size=(6, 3)) / size
-        p = points + 0.6 * size * np.sin(points[:, [1, 2, 0]] * 1.7 / size)
-        v = sum(np.abs(np.sin(p @ wave * 1.5**k)) / 1.4**k for k, wave in enumerate(waves))
-        v = np.clip(np.asarray(v) / 2.2, 0, 1)
-        return dark + (light - dark) * v
+        p = points + size * np.sin(points[:, [1, 2, 0]] / size)
+        v = [np.abs(np.sin(p @ wave * 1.8**k)) for k, wave in enumerate(waves)]
+        return dark + (light - dark) * np.sqrt(np.average(v, axis=0, weights=0.6 ** np.arange(5)))
 
     return texture
 
 
-def glaze(points: Floats) -> Floats:
-    """Painted bands and a wave around a pot's belly, over a faint cloud."""
-    x, y, z = points.T
-    angle = np.arctan2(x, z)
-    ground = veins(0.62, 0.82, 14)(points)
-    wave = np.abs(y - 46 - 5 * np.sin(6 * angle)) < 2.2
-    rings = (np.abs(y - 33) < 1.3) | (np.abs(y - 59) < 1.3) | (np.abs(y - 84) < 1.6) | (y < 7)
-    return np.where(wave | rings, 0.3, ground)
+def painted(ground: Texture, rings: tuple[tuple[float, float], ...], wave: float) -> Texture:
+    """Dark rings (height, half width), and a wavy one at the height `wave`, mm, on `ground`."""
+
+    def texture(points: Floats) -> Floats:
+        x, y, z = points.T
+        crest = wave + 5 * np.sin(6 * np.arctan2(x, z))
+        bands = [np.abs(y - height) < half for height, half in (*rings, (crest, 2.2))]
+        return np.where(np.any(bands, axis=0), 0.3, ground(points))
+
+    return texture
 
 
 def _sphere_cone() -> Setup:
+    """The scene of Fig. 5; shares of the factors as in Table 1 to about one percent of all."""
     return Setup(
         surfaces=(
-            Surface(sphere((-30, 31, 12), 31), 0.85, 0.55, 13),
-            Surface(cone((36, 0, -8), 34, 78), 0.7, 0.55, 13),
+            Surface(sphere((-33, 36, 10), 36), 0.85, 0.55, 13),
+            Surface(cone((38, 0, -4), 34, 78), 0.7, 0.55, 13),
             Surface(Ring((0, 0, 0)), 0.6),
         ),
         size=(120, 160),
         images=20,
-        view=(120, 160),
-        centre=(2, 30, 0),
+        view=(111, 148),
+        centre=(1.5, 32, 0),
         tilt=50,
-        clearance=0.25,
+        elevations=(38, 70),
+        clearance=0.12,
     )
 
 
 def _cup() -> Setup:
-    clay = 0.75
+    """A deep cup: its inside shadows itself, as in Fig. 7."""
+    glaze = painted(veins(0.7, 0.85, 20), ((10, 1.2), (54, 1.2)), 32)
+    clay = veins(0.65, 0.85, 20)
+    outside = lathe((0, 0, 0), (24, 24, 33, 38, 41, 43, 43), 64)
+    inside = lathe((0, 7, 0), (-20, 20, 32, 36, 38.5, 40, 40), 57)
     return Setup(
         surfaces=(
-            *(
-                Surface(s, clay, 0.35, 25)
-                for s in lathe((0, 0, 0), (22, 30, 36, 39, 41, 42, 43), 70)
-            ),
-            *(
-                Surface(s, clay, 0.35, 25)
-                for s in lathe((0, 6, 0), (-8, 8, 27, 34, 37, 38.5, 39.5), 64)
-            ),
+            *(Surface(piece, glaze, 0.4, 30) for piece in outside),
+            *(Surface(piece, clay, 0.4, 30) for piece in inside),
+            Surface(Ring((0, 64, 0), 40, 43), 0.8, 0.4, 30),
         ),
         size=(128, 128),
         images=24,
-        view=(112, 112),
-        centre=(0, 36, 0),
-        tilt=45,
+        view=(106, 106),
+        centre=(0, 34, 0),
+        tilt=50,
     )
 
 
 def _pot() -> Setup:
+    """A glossy, painted pot with a narrow neck."""
+    rings = ((3.5, 3.5), (33, 1.3), (59, 1.3), (84, 1.6))
+    glaze = painted(veins(0.5, 0.9, 14), rings, 46)
+    body = lathe((0, 0, 0), (17, 17, 30, 40, 42, 37, 25, 14, 12, 17, 19), 96)
     return Setup(
-        surfaces=tuple(
-            Surface(s, glaze, 0.5, 40)
-            for s in lathe((0, 0, 0), (17, 17, 30, 40, 42, 37, 25, 14, 12, 17, 19), 96)
+        surfaces=(
+            *(Surface(piece, glaze, 0.5, 40) for piece in body),
+            Surface(Ring((0, 0, 0), 0, 17), 0.5),
         ),
         size=(128, 128),
         images=24,
-        view=(112, 112),
-        centre=(0, 48, 0),
+        view=(110, 110),
+        centre=(0, 47, 0),
         tilt=15,
         power=(0.75, 1.05),
     )
 
 
 def _sphere_obstacles() -> Setup:
+    """A sphere of 50 mm between poles and blocks, as in Fig. 12."""
     wood = 0.4
     return Setup(
         surfaces=(
-            Surface(sphere((0, 0, 0), 50), veins(0.5, 0.95, 16), 0.45, 25),
+            Surface(sphere((0, 0, 0), 50), veins(0.4, 0.95, 14), 0.45, 25),
             Surface(pole((-59, -80, 46), 6, 160), wood),
             Surface(pole((60, -80, 52), 5, 160), wood),
             Surface(Block((-66, 14, 20), (5, 22, 46)), wood),
@@ -161,7 +170,6 @@ def _sphere_obstacles() -> Setup:
         size=(120, 160),
         images=24,
         view=(117, 156),
-        elevations=(30, 75),
         power=(0.75, 1.05),
     )
 

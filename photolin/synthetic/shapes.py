@@ -131,12 +131,13 @@ def pole(base: Vector, radius: float, length: float, axis: Vector = (0, 1, 0)) -
 def lathe(base: Vector, radii: tuple[float, ...], height: float) -> tuple[Quadric, ...]:
     """A smooth surface of revolution from `base` up to `height`, mm.
 
-    r² is the uniform quadratic B-spline in h with the control values `radii`²: one quadric for
-    each span, and no crease between them.
+    r² is the uniform quadratic B-spline in h with the control values `radii`·|`radii`|: one
+    quadric for each span, and no crease between them. Two equal radii at an end make it end
+    there upright, two opposite ones (-r, r) close it with a round bottom.
     """
     spans = len(radii) - 2
     step = height / spans
-    p = np.square(radii)
+    p = np.multiply(radii, np.abs(radii))
     pieces = []
     for k in range(spans):
         a, b, c = (p[k] + p[k + 1]) / 2, (p[k + 1] - p[k]) / step, (p[k] - 2 * p[k + 1] + p[k + 2])
