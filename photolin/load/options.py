@@ -1,0 +1,43 @@
+"""How a stack is read."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from ..errors import OptionError
+
+Channel = Literal["mean", "luminance", "max", "r", "g", "b"]
+Transfer = Literal["auto", "linear", "srgb"]
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """What decides the numbers of a stack, besides its files."""
+
+    channel: Channel = "mean"
+    """How colour becomes one channel; luminance weighs linear values by Rec. 709."""
+    transfer: Transfer = "auto"
+    """How stored values relate to light; auto decides by the kind of file and its tags."""
+    mask: Path | None = None
+    """Image file, bright on the object; the layout's own when left out."""
+    lights: Path | Literal["none"] | None = None
+    """Lights file; the layout's own when left out; "none" ignores lights."""
+    dark: Path | None = None
+    """Image taken with the lights off, subtracted from all; the layout's own when left out."""
+    roi: tuple[int, int, int, int] | None = None
+    """Region to read: row0, row1, column0, column1, half-open; everything when left out."""
+
+    def __post_init__(self) -> None:
+        for name, value, kinds in (
+            ("channel", self.channel, get_args(Channel)),
+            ("transfer", self.transfer, get_args(Transfer)),
+        ):
+            if value not in kinds:
+                raise OptionError(f"{name} is {value!r}; accepted are {', '.join(kinds)}")
+        if self.roi is not None:
+            row0, row1, col0, col1 = self.roi
+            if not (0 <= row0 < row1 and 0 <= col0 < col1):
+                raise OptionError(
+                    f"roi is {self.roi}; accepted is row0 row1 col0 col1 with 0 <= row0 < row1 "
+                    "and 0 <= col0 < col1"
+                )
