@@ -86,6 +86,10 @@ def test_numbers_that_decide_are_never_printed_alike():
     assert "i - l = 0.02004 > T·i = 0.02000" in explain(0.4, 0.37996, THRESHOLDS, "a")
 
 
+def test_an_intensity_at_the_shadow_level_is_lit():
+    assert "i = 0.020 ≥ Ts = 0.020 and |i - l| = 0.000" in explain(0.02, 0.02, THRESHOLDS, "a")
+
+
 def test_a_tiny_value_does_not_read_as_zero_and_zero_has_no_sign():
     assert "l 1.0e-06 of full scale" in explain(0.004, 1e-6, THRESHOLDS, "a")
     assert "l 0.000 of full scale" in explain(0.004, -0.0, THRESHOLDS, "a")

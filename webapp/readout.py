@@ -104,7 +104,7 @@ def status_line(row: int, column: int, i: float, l: float, label: int) -> str:  
 def legend(labels: NDArray[np.uint8]) -> tuple[LegendRow, ...]:
     """Count and share of each class of a label map (H,W) or (K,H,W), in the legend's order."""
     inside = int(np.count_nonzero(labels != OUTSIDE))
-    counts = {factor: int(np.count_nonzero(labels == factor)) for factor in LETTERS}
+    counts = {factor: int(np.count_nonzero(labels == np.uint8(factor))) for factor in LETTERS}
     return tuple(
         LegendRow(
             factor, letter, TITLES[factor], counts[factor], 100 * counts[factor] / max(inside, 1)
