@@ -1,0 +1,39 @@
+"""Every file a user takes away: results, label maps, masks, linearized images."""
+
+from .files import (
+    CONTENTS,
+    Contents,
+    export_files,
+    label_png,
+    linearized_tiff,
+    mask_png,
+    write_file,
+    zip_files,
+)
+from .report import program_version
+from .result import (
+    check_output,
+    is_result,
+    load_result,
+    load_result_stack,
+    result_npz,
+    save_result,
+)
+
+__all__ = [
+    "CONTENTS",
+    "Contents",
+    "check_output",
+    "export_files",
+    "is_result",
+    "label_png",
+    "linearized_tiff",
+    "load_result",
+    "load_result_stack",
+    "mask_png",
+    "program_version",
+    "result_npz",
+    "save_result",
+    "write_file",
+    "zip_files",
+]

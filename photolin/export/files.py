@@ -1,0 +1,146 @@
+"""Pictures and arrays of an analysis as bytes: the same for a folder and for a browser."""
+
+import io
+import os
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis import Analysis
+from ..errors import OptionError, OutputError
+from ..factors import LETTERS, OUTSIDE, PALETTE, TITLES, Factor
+
+Contents = Literal["labels", "masks", "linearized"]
+CONTENTS: tuple[Contents, ...] = get_args(Contents)
+
+
+def label_png(labels: NDArray[np.uint8]) -> bytes:
+    """Encode one label map as an indexed PNG: pixel values are the Factor codes.
+
+    Args:
+        labels: (H,W) Factor codes; OUTSIDE (255) becomes transparent.
+    """
+    from PIL import Image
+
+    palette = np.zeros((256, 3), np.uint8)
+    for factor, colour in PALETTE.items():
+        palette[factor] = colour
+    image = Image.fromarray(labels)
+    image.putpalette(palette.tobytes())
+    return _png(image, transparency=OUTSIDE)
+
+
+def mask_png(labels: NDArray[np.uint8], factor: Factor) -> bytes:
+    """Encode where (H,W) `labels` equals `factor` as a gray PNG of 0 and 255."""
+    from PIL import Image
+
+    return _png(Image.fromarray(np.where(labels == factor, np.uint8(255), np.uint8(0))))
+
+
+def linearized_tiff(analysis: Analysis, images: Sequence[int]) -> bytes:
+    """Encode linearized images as float32 TIFF pages: signed, fraction of full scale.
+
+    Args:
+        analysis: what to take them from.
+        images: image numbers from 0, one page each; the page's description names it.
+    """
+    import tifffile
+
+    buffer = io.BytesIO()
+    H, W = analysis.mask.shape
+    with tifffile.TiffWriter(buffer, bigtiff=len(images) * H * W * 4 > 4e9) as tiff:
+        for k in images:
+            text = f"linearized image {k} ({analysis.names[k]}), signed, fraction of full scale"
+            tiff.write(
+                analysis.linearized(k),
+                photometric="minisblack",
+                description=text.encode("utf-8", "backslashreplace"),
+                metadata=None,
+                software=False,
+            )
+    return buffer.getvalue()
+
+
+def export_files(
+    analysis: Analysis, contents: Contents, images: Sequence[int] | None = None
+) -> dict[str, bytes]:
+    """Encode one kind of export.
+
+    Args:
+        analysis: what to export.
+        contents: `labels` (indexed PNG, pixel values are Factor codes), `masks` (one PNG of 0 and
+            255 for each factor) or `linearized` (one float32 TIFF, a page for each image).
+        images: image numbers from 0; all when left out.
+
+    Returns:
+        File name to bytes; the names are unique, ordered by image and safe on any file system.
+
+    Raises:
+        OptionError: an image number is out of range.
+    """
+    K = len(analysis.names)
+    chosen = range(K) if images is None else images
+    for k in chosen:
+        if not 0 <= k < K:
+            raise OptionError(f"image is {k}; accepted is 0 to {K - 1}")
+    if contents == "linearized":
+        single = f"_{_stem(analysis, chosen[0])}" if len(chosen) == 1 else ""
+        return {f"linearized{single}.tif": linearized_tiff(analysis, chosen)}
+    if contents == "labels":
+        return {f"labels_{_stem(analysis, k)}.png": label_png(analysis.labels[k]) for k in chosen}
+    return {
+        f"mask_{_stem(analysis, k)}_{LETTERS[factor]}_{TITLES[factor].replace(' ', '_')}.png": (
+            mask_png(analysis.labels[k], factor)
+        )
+        for k in chosen
+        for factor in LETTERS
+    }
+
+
+def zip_files(files: Mapping[str, bytes]) -> bytes:
+    """Pack files into a zip archive whose bytes depend on their names and contents alone."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name)  # dated 1980, the zip epoch, not now
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
+
+
+def write_file(path: Path, data: bytes) -> None:
+    """Write `data` whole or not at all, making folders, replacing what was there.
+
+    Raises:
+        OutputError: the folder cannot be made or written, or the disk is full.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_bytes(data)
+        os.replace(partial, path)
+    except OSError as error:
+        raise OutputError(
+            f"{path}: cannot be written ({error.strerror}); a writable folder with room is accepted"
+        ) from error
+    finally:
+        with suppress(OSError):
+            partial.unlink()
+
+
+def _png(image, **options: int) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG", **options)
+    return buffer.getvalue()
+
+
+def _stem(analysis: Analysis, k: int) -> str:
+    """Image number and name, without what a file system or archive could stumble over."""
+    stem = re.sub(r"[^A-Za-z0-9-]+", "_", Path(analysis.names[k]).stem).strip("_")[:60]
+    return f"{k:03d}_{stem}".rstrip("_")

@@ -1,0 +1,121 @@
+"""`report.json`: what was asked, what was read, what came out."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis import Analysis
+from ..errors import InputError
+from ..factors import TITLES, Factor, classifiable
+from ..load import LoadOptions
+
+RESULT, REPORT = "result.npz", "report.json"
+
+ENTRIES = {
+    "title": str,
+    "options": dict,
+    "files": list,
+    "notes": list,
+    "warnings": list,
+    "images": list,
+    "seconds": dict,
+}
+"""Type of each entry of report.json that is read back."""
+
+
+def program_version() -> str:
+    """Version of the installed photolin."""
+    try:
+        return version("photolin")
+    except PackageNotFoundError:
+        return "not installed"  # run from its source folder
+
+
+def describe_analysis(analysis: Analysis) -> dict[str, Any]:
+    """What report.json says about the analysis itself."""
+    inside = analysis.labels[:, analysis.mask]
+    supported = classifiable(inside)
+    per_pixel = supported.mean(axis=0)
+    images = [
+        {
+            "name": name,
+            "counts": {TITLES[factor]: int((row == factor).sum()) for factor in Factor},
+            "support": float(fitting.mean()),
+        }
+        for name, row, fitting in zip(analysis.names, inside, supported, strict=True)
+    ]
+    return {
+        "version": program_version(),
+        "title": analysis.title,
+        "options": asdict(analysis.options),
+        "seed": analysis.options.seed,
+        "thresholds": asdict(analysis.thresholds),
+        "base_images": list(analysis.base_images),
+        "files": [{"path": path, "sha256": digest} for path, digest in analysis.files],
+        "notes": list(analysis.notes),
+        "warnings": list(analysis.warnings),
+        "images": images,
+        "support": {
+            "pixels": int(per_pixel.size),
+            "mean": float(per_pixel.mean()),
+            **{f"p{q:02d}": float(np.percentile(per_pixel, q)) for q in (5, 25, 50, 75, 95)},
+        },
+        "seconds": dict(analysis.seconds),
+    }
+
+
+def describe_reading(options: LoadOptions) -> dict[str, Any]:
+    """Load options for the report: paths are absolute, so they hold from any folder."""
+    return {k: str(v.resolve()) if isinstance(v, Path) else v for k, v in asdict(options).items()}
+
+
+def restore_reading(entry: dict[str, Any] | None) -> LoadOptions:
+    """Load options from the report."""
+    entry = dict(entry or {})
+    for name in ("mask", "lights", "dark"):
+        if entry.get(name) not in (None, "none"):
+            entry[name] = Path(entry[name])
+    if entry.get("roi") is not None:
+        entry["roi"] = tuple(entry["roi"])
+    return LoadOptions(**entry)
+
+
+def read_report(file: Path) -> dict[str, Any]:
+    """The report beside result.npz, once it is known to be about that very file."""
+    path = file.with_name(REPORT)
+    try:
+        report = json.loads(read_bytes(path))
+    except ValueError as error:
+        raise foreign(path) from error
+    if not isinstance(report, dict):
+        raise foreign(path)
+    if report.get("result_sha256") != hashlib.sha256(read_bytes(file)).hexdigest():
+        raise InputError(
+            f"{file}: was cut short, or {REPORT} describes another; "
+            "both files as photolin run wrote them are accepted"
+        )
+    if not all(isinstance(report.get(key), kind) for key, kind in ENTRIES.items()):
+        raise foreign(path)
+    return report
+
+
+def read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); a folder with {RESULT} and {REPORT}, "
+            "as photolin run writes it, is accepted"
+        ) from error
+
+
+def foreign(path: Path) -> InputError:
+    return InputError(
+        f"{path}: is not a result of photolin or was cut short; "
+        "a folder written by photolin run is accepted"
+    )

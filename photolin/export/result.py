@@ -1,0 +1,211 @@
+"""A run on disk: `result.npz` holds the arrays, `report.json` says how they came about."""
+
+import hashlib
+import io
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis import Analysis, Options
+from ..errors import InputError, OutputError, PhotolinError
+from ..factors import OUTSIDE, Thresholds
+from ..load import LoadOptions, load_stack
+from ..stack import ImageStack
+from .files import write_file
+from .report import (
+    REPORT,
+    RESULT,
+    describe_analysis,
+    describe_reading,
+    foreign,
+    read_bytes,
+    read_report,
+    restore_reading,
+)
+
+ARRAYS = {
+    "labels": (np.uint8, "KHW"),
+    "coefficients": (np.float64, "K3"),
+    "base_images": (np.int64, "3"),
+    "linearized_bases": (np.float32, "3HW"),
+    "mask": (np.bool_, "HW"),
+    "T": (np.float64, ""),
+    "Ts": (np.float64, ""),
+    "lights": (np.float64, "K3"),
+}
+"""Type and axes of each array in result.npz; `lights` is there when the stack had them."""
+
+
+def save_result(
+    analysis: Analysis,
+    folder: str | Path,
+    *,
+    command: str | None = None,
+    stack_path: str | Path | None = None,
+    load_options: LoadOptions | None = None,
+) -> None:
+    """Write `folder`/result.npz and `folder`/report.json, replacing an earlier result.
+
+    Args:
+        analysis: what to write.
+        folder: made when missing.
+        command: the command line that led here, for the report.
+        stack_path, load_options: where the stack was read from and how, so that
+            `load_result_stack` finds it again.
+
+    Raises:
+        OutputError: `folder` is a file or cannot be written; nothing half-written is left.
+    """
+    folder = Path(folder)
+    check_output(folder)
+    arrays = result_npz(analysis)
+    report = describe_analysis(analysis) | {
+        "command": command,
+        "stack": None if stack_path is None else str(Path(stack_path).resolve()),
+        "load": None if load_options is None else describe_reading(load_options),
+        "result_sha256": hashlib.sha256(arrays).hexdigest(),
+    }
+    text = json.dumps(report, indent=1) + "\n"
+    write_file(folder / RESULT, arrays)
+    write_file(folder / REPORT, text.encode())
+
+
+def check_output(folder: str | Path) -> None:
+    """Raise OutputError unless `folder` can be made or written; touches nothing."""
+    folder = Path(folder)
+    above = (folder.absolute(), *folder.absolute().parents)
+    there = next(path for path in above if os.path.exists(path))
+    if not there.is_dir():
+        raise OutputError(f"{there}: is a file; a folder, or a name for a new one, is accepted")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise OutputError(f"{there}: cannot be written; a writable folder is accepted")
+
+
+def result_npz(analysis: Analysis) -> bytes:
+    """Encode the arrays of `result.npz`; equal analyses give equal bytes.
+
+    Numpy dates every entry 1980, so no clock enters the archive.
+    """
+    arrays = {
+        "labels": analysis.labels,
+        "coefficients": analysis.coefficients,
+        "base_images": analysis.base_images,
+        "linearized_bases": analysis.linearized_bases,
+        "mask": analysis.mask,
+        "T": analysis.thresholds.T,
+        "Ts": analysis.thresholds.Ts,
+    }
+    if analysis.lights is not None:
+        arrays["lights"] = analysis.lights
+    buffer = io.BytesIO()
+    typed = {name: np.asarray(value, ARRAYS[name][0]) for name, value in arrays.items()}
+    np.savez_compressed(buffer, allow_pickle=False, **typed)
+    return buffer.getvalue()
+
+
+def load_result(path: str | Path) -> Analysis:
+    """Read back what `save_result` wrote: equal to what was saved.
+
+    Args:
+        path: the folder, or the result.npz in it.
+
+    Raises:
+        InputError: a file is missing, cut short, or not a photolin result.
+    """
+    file = _result_file(path)
+    report, arrays = read_report(file), _read_arrays(file)
+    try:
+        options = report["options"]
+        if options["base_images"] is not None:
+            options = options | {"base_images": tuple(options["base_images"])}
+        first, second, third = arrays["base_images"].tolist()
+        return Analysis(
+            options=Options(**options),
+            thresholds=Thresholds(float(arrays["T"]), float(arrays["Ts"])),
+            base_images=(first, second, third),
+            coefficients=arrays["coefficients"],
+            linearized_bases=arrays["linearized_bases"],
+            labels=arrays["labels"],
+            mask=arrays["mask"],
+            names=tuple(image["name"] for image in report["images"]),
+            seconds={stage: float(s) for stage, s in report["seconds"].items()},
+            title=report["title"],
+            lights=arrays.get("lights"),
+            files=tuple((entry["path"], entry["sha256"]) for entry in report["files"]),
+            notes=tuple(report["notes"]),
+            warnings=tuple(report["warnings"]),
+        )
+    except (KeyError, TypeError, ValueError, PhotolinError) as error:
+        raise foreign(file.with_name(REPORT)) from error
+
+
+def load_result_stack(path: str | Path, stack_path: str | Path | None = None) -> ImageStack:
+    """Read the stack a result was computed from, the way it was read then.
+
+    Args:
+        path: the result's folder, or the result.npz in it.
+        stack_path: where the images are now; where they were then when left out.
+
+    Raises:
+        InputError: the images have moved or changed.
+    """
+    file = _result_file(path)
+    report = read_report(file)
+    place = stack_path or report.get("stack")
+    if place is None or not Path(place).exists():
+        where = "nothing says where they were" if place is None else f"{place} is missing"
+        raise InputError(f"{file}: its images are not found ({where}); name them with --stack")
+    try:
+        options = restore_reading(report["load"])
+        known = {entry["sha256"] for entry in report["files"]}
+    except (KeyError, TypeError, AttributeError, PhotolinError) as error:
+        raise foreign(file.with_name(REPORT)) from error
+    stack = load_stack(Path(place), options)
+    changed = [name for name, digest in stack.files if digest not in known]
+    if changed:
+        raise InputError(
+            f"{changed[0]}: is not the file {file} was computed from; "
+            "run again, or name the right images with --stack"
+        )
+    return stack
+
+
+def is_result(path: str | Path) -> bool:
+    """Whether `path` is, or holds, a result rather than a stack."""
+    path = Path(path)
+    if path.is_dir():
+        return (path / REPORT).is_file()
+    return path.name == RESULT and path.with_name(REPORT).is_file()
+
+
+def _result_file(path: str | Path) -> Path:
+    path = Path(path)
+    return path / RESULT if path.is_dir() else path
+
+
+def _read_arrays(file: Path) -> Mapping[str, NDArray]:
+    """The arrays of result.npz, each of the type and shape ARRAYS says."""
+    try:
+        with np.load(io.BytesIO(read_bytes(file)), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in ARRAYS if name in archive}
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise foreign(file) from error
+    if not set(ARRAYS) - {"lights"} <= set(arrays):
+        raise foreign(file)
+    sizes = {"3": 3}
+    for name, array in arrays.items():
+        dtype, axes = ARRAYS[name]
+        if array.dtype != dtype or array.ndim != len(axes):
+            raise foreign(file)
+        for axis, size in zip(axes, array.shape, strict=True):
+            if sizes.setdefault(axis, size) != size:
+                raise foreign(file)
+    if not np.array_equal(arrays["labels"][0] == OUTSIDE, ~arrays["mask"]):
+        raise foreign(file)
+    return arrays
