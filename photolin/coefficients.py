@@ -1,0 +1,85 @@
+"""Step 1 as published: coefficients of every image from random samples of three pixels (Eq. 2, 5)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel, Options, Progress
+from .blocks import run_blocks
+from .errors import DegenerateError
+from .factors import Thresholds
+from .kernels import centre_rows, support_rows
+from .stack import ImageStack
+
+KEEP = 0.05
+"""Share of the candidates the statistical method ends with at the least."""
+SINGULAR = 1e-6
+"""Normalized determinant below which three observations do not determine a candidate."""
+
+
+def estimate_coefficients(
+    stack: ImageStack,
+    base_images: tuple[int, int, int],
+    thresholds: Thresholds,
+    options: Options,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> NDArray[np.float64]:
+    """Coefficients by random samples over all mask pixels.
+
+    Args:
+        options: method (classification: maximum SupportC, Eq. 5; statistical: centre of gravity
+            and outlier elimination, the earlier method), samples for each image, seed.
+
+    Returns:
+        (K,3); rows of the base images are unit vectors.
+
+    Raises:
+        DegenerateError: no sample determines a candidate.
+        Cancelled: `cancel` said so.
+    """
+    K = len(stack.images)
+    X = np.ascontiguousarray(stack.images.reshape(K, -1)[:, stack.pixels])
+    A = X[list(base_images)]
+    rng = np.random.default_rng([options.seed, 1])
+    triples, inverses = draw_samples(A, options.samples, rng)
+    if len(triples) == 0:
+        raise DegenerateError(
+            f"base images {base_images}: no three pixels tell them apart; "
+            "their lights may lie in one plane, or they share too few lit pixels"
+        )
+    out, support = np.empty((K, 3), np.float32), np.empty(K, np.int32)
+    keep = int(np.ceil(KEEP * len(triples)))
+    T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
+
+    def work(start: int, stop: int) -> None:
+        if options.method == "statistical":
+            centre_rows(X, triples, inverses, keep, out, start, stop)
+        else:
+            support_rows(X, A, triples, inverses, T, Ts, out, support, start, stop)
+
+    run_blocks(
+        work, K, 1, threads=threads, stage="coefficients", progress=progress, cancel=cancel
+    )
+    coefficients = out.astype(np.float64)
+    coefficients[list(base_images)] = np.eye(3)
+    return coefficients
+
+
+def draw_samples(
+    A: NDArray[np.floating], count: int, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Random triples of the M factors and the inverses that solve them.
+
+    Args:
+        A: (3,M) factors.
+        count: how many to draw; the singular ones among them are dropped.
+
+    Returns:
+        (n,3) observation numbers, (n,3,3) inverses: v = inverse @ x[triple].
+    """
+    triples = rng.integers(0, A.shape[1], (count, 3))
+    rows = A[:, triples].transpose(1, 2, 0).astype(np.float64)
+    norms = np.prod(np.linalg.norm(rows, axis=2), axis=1)
+    regular = np.abs(np.linalg.det(rows)) > SINGULAR * norms
+    return triples[regular], np.linalg.inv(rows[regular]).astype(np.float32)

@@ -1,0 +1,199 @@
+"""Coefficients of all images at once, by alternation: step 1 of `robust`.
+
+Base images with wide highlights or a dominant plane give poor coefficients, whatever is done with
+them. So they only give a start: bases are linearized with those coefficients, coefficients are
+estimated again from the linearized bases, and so on while T is annealed down. The support over
+all sampled pixels and images decides between starts from different base images.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel
+from .consensus import fit_rows
+from .errors import Cancelled, DegenerateError
+from .factors import Thresholds
+from .sample import Sample
+
+COARSE = (6.0, 4.0, 3.0)
+FINE = (2.0, 1.5, 1.0, 1.0, 0.7, 0.5, 0.5)
+"""T during alternation, in units of T; below 1 highlight tails leave the fit."""
+MAX_T = 0.3
+ROUGH_PIXELS = 1000
+MIN_SCORE = 4
+"""D - U a pixel needs to have a say in the coefficients: three D observations fit anything."""
+
+
+NO_START = (
+    "no base images explain the others: the lights may lie in one plane, the scene may be flat, "
+    "or Ts may lie above most lit pixels; vary the lights or lower Ts"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Factorization:
+    """Coefficients and linearized bases of a sample that explain each other."""
+
+    coefficients: NDArray[np.float64]
+    """(K,3); columns orthogonal, of length sqrt(K/3)."""
+    bases: NDArray[np.float32]
+    """(3,M) of the sampled pixels; NaN where lit in fewer than three images."""
+    score: int
+    """D - U over all sampled pixels and images."""
+
+
+def search_coefficients(
+    sample: Sample,
+    starts: Sequence[tuple[int, int, int]],
+    thresholds: Thresholds,
+    seed: int,
+    limit: int,
+    cancel: Cancel | None = None,
+) -> NDArray[np.float64]:
+    """Rough coefficients: the best-supported ones from several choices of base images.
+
+    Args:
+        starts: triples of base images to start from.
+        limit: the most random samples for one fit.
+
+    Returns:
+        (K,3)
+
+    Raises:
+        DegenerateError: no start led anywhere.
+        Cancelled: `cancel` said so.
+    """
+    few = sample.thin(ROUGH_PIXELS)
+    found = []
+    for triple in starts:
+        first = start_coefficients(few, triple, thresholds, seed, limit)
+        if first is not None:
+            found.append(alternate(few, first, thresholds, COARSE, seed, limit, cancel))
+    found = [f for f in found if f is not None]
+    if not found:
+        raise DegenerateError(NO_START)
+    return max(found, key=lambda f: f.score).coefficients
+
+
+def refine_coefficients(
+    sample: Sample,
+    coefficients: NDArray[np.float64],
+    thresholds: Thresholds,
+    seed: int,
+    limit: int,
+    cancel: Cancel | None = None,
+) -> Factorization:
+    """The factorization that alternation reaches from rough coefficients (K,3).
+
+    Raises:
+        DegenerateError: it lost a dimension on the way.
+        Cancelled: `cancel` said so.
+    """
+    found = alternate(sample, coefficients, thresholds, FINE, seed, limit, cancel)
+    if found is None:
+        raise DegenerateError(NO_START)
+    return found
+
+
+def start_coefficients(
+    sample: Sample,
+    triple: tuple[int, int, int],
+    thresholds: Thresholds,
+    seed: int,
+    limit: int,
+) -> NDArray[np.float64] | None:
+    """(K,3) coefficients of Eq. (2) with raw base images, from pixels lit in all three."""
+    bases = sample.images[list(triple)].copy()
+    bases[:, (bases < thresholds.Ts).any(axis=0)] = np.nan
+    T = min(max(3 * thresholds.T, 0.1), MAX_T)
+    return fit_coefficients(sample, bases, T, thresholds.Ts, seed, limit)
+
+
+def fit_coefficients(
+    sample: Sample,
+    bases: NDArray[np.float32],
+    T: float,
+    Ts: float,
+    seed: int,
+    limit: int,
+    guess: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64] | None:
+    """(K,3) coefficients from bases (3,M), NaN in pixels without a say; None if not determined."""
+    K = len(sample.images)
+    voters = balance_directions(bases, np.random.default_rng(seed))
+    c, _ = fit_rows(sample.pixels, np.arange(K), voters, T, Ts, limit=limit, seed=seed, guess=guess)
+    c = c.astype(np.float64)
+    if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
+        return None
+    return c
+
+
+def alternate(
+    sample: Sample,
+    coefficients: NDArray[np.float64],
+    thresholds: Thresholds,
+    schedule: tuple[float, ...],
+    seed: int,
+    limit: int,
+    cancel: Cancel | None = None,
+) -> Factorization | None:
+    """Bases from coefficients and coefficients from bases, once for each T of the schedule."""
+    for factor in schedule:
+        if cancel is not None and cancel():
+            raise Cancelled("coefficients was cancelled")
+        T = min(factor * thresholds.T, MAX_T)
+        coefficients = orthogonalize(coefficients)
+        bases, score = fit_bases(sample, coefficients, T, thresholds.Ts, seed, limit)
+        bases[:, score < MIN_SCORE] = np.nan
+        found = fit_coefficients(sample, bases, T, thresholds.Ts, seed, limit, coefficients)
+        if found is None:
+            return None
+        coefficients = found
+    coefficients = orthogonalize(coefficients)
+    bases, score = fit_bases(sample, coefficients, thresholds.T, thresholds.Ts, seed, limit)
+    return Factorization(coefficients, bases, int(score[score > 0].sum()))
+
+
+def fit_bases(
+    sample: Sample, coefficients: NDArray, T: float, Ts: float, seed: int, limit: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """(3,M) linearized bases of the sampled pixels and their (M,) scores."""
+    columns = np.arange(sample.images.shape[1])
+    b, score = fit_rows(sample.images, columns, coefficients.T, T, Ts, limit=limit, seed=seed)
+    return np.ascontiguousarray(b.T), score
+
+
+def orthogonalize(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same column space with orthogonal columns of length sqrt(K/3).
+
+    Only in such a frame does a small determinant mean lights near a plane, and a direction of the
+    bases a direction of the surface.
+    """
+    return np.linalg.qr(coefficients)[0] * np.sqrt(len(coefficients) / 3)
+
+
+def balance_directions(
+    bases: NDArray[np.float32], rng: np.random.Generator, cells: int = 6
+) -> NDArray[np.float32]:
+    """Bases with pixels of over-represented directions set to NaN.
+
+    A plane that fills most of the picture is one direction; without this, a candidate that maps
+    it right wins almost all votes whatever it does elsewhere.
+    """
+    voters = np.flatnonzero(np.isfinite(bases[0]))
+    if len(voters) == 0:
+        return bases
+    voters = rng.permutation(voters)
+    unit = bases[:, voters] / np.linalg.norm(bases[:, voters], axis=0)
+    cell = np.unique(np.rint(unit * cells).astype(np.int8), axis=1, return_inverse=True)[1].ravel()
+    order = np.argsort(cell, kind="stable")
+    counts = np.bincount(cell)
+    rank = np.empty(len(cell), np.int64)
+    rank[order] = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
+    keep = voters[rank < max(16, 2 * int(np.median(counts)))]
+    balanced = np.full_like(bases, np.nan)
+    balanced[:, keep] = bases[:, keep]
+    return balanced

@@ -1,0 +1,20 @@
+"""The compiled loops: plain arrays in, plain arrays out, no policy.
+
+All run without the interpreter lock on a range of rows, so that `photolin.blocks.run_blocks` can
+spread them over threads; each row depends on nothing but its own data and the seed, hence the
+result does not depend on threads or block size. Every loop has a plain-numpy twin in the tests.
+
+Both halves of the method are one problem. A *row* of observations x (M,) is explained by *factors*
+A (M,3) and an unknown v (3,): x = A v wherever reflection is diffuse. For a pixel the observations
+are its K images, A the coefficients and v its linearized bases (Eq. 6). For an image the
+observations are its P pixels, A the bases and v its coefficients (Eq. 5).
+
+A dark observation (i < Ts) is A or C whatever v says, so it adds the same constant to the support
+of every candidate: only lit observations are ever compared.
+"""
+
+from .consensus import consensus_rows
+from .labels import label_rows
+from .samples import centre_rows, support_rows
+
+__all__ = ["centre_rows", "consensus_rows", "label_rows", "support_rows"]

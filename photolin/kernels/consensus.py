@@ -1,0 +1,196 @@
+"""Adaptive sample consensus with refinement: the compiled heart of `robust`."""
+
+import numpy as np
+from numba import njit
+
+UNFIT = -(2**30)
+"""Score of no candidate at all."""
+
+
+@njit(nogil=True, cache=True, inline="always")
+def _next(state):  # pragma: no cover
+    """Splitmix64: the next state and 32 random bits of it."""
+    state = state + np.uint64(0x9E3779B97F4A7C15)
+    z = state
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return state, (z ^ (z >> np.uint64(31))) >> np.uint64(32)
+
+
+@njit(nogil=True, cache=True)
+def _score(x, a0, a1, a2, n, v, T):  # pragma: no cover
+    """D minus U over n lit observations, and D alone.
+
+    Light can only be added to a lit pixel: one that is darker than the fit, or lit though the fit
+    says it faces away, contradicts physics and votes against.
+    """
+    v0, v1, v2 = v[0], v[1], v[2]
+    diffuse = np.int32(0)
+    against = np.int32(0)
+    for m in range(n):
+        l = a0[m] * v0 + a1[m] * v1 + a2[m] * v2  # noqa: E741
+        excess = x[m] - l
+        slack = T * x[m]
+        d = abs(excess) <= slack
+        diffuse += np.int32(d)
+        against += np.int32((not d) & ((excess < 0) | (l < 0)))
+    return diffuse - against, diffuse
+
+
+@njit(nogil=True, cache=True)
+def _misfit(x, a0, a1, a2, n, v, T):  # pragma: no cover
+    """Sum over D of ((i - l) / (T i))^2: settles equal scores."""
+    total = 0.0
+    for m in range(n):
+        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
+        slack = T * x[m]
+        if abs(excess) <= slack and slack > 0:
+            total += (excess / slack) ** 2
+    return total
+
+
+@njit(nogil=True, cache=True)
+def _solve(G, h, out):  # pragma: no cover
+    """out = inverse(G) h for symmetric 3x3 float64 G; false where G is singular."""
+    c00 = G[1, 1] * G[2, 2] - G[1, 2] * G[1, 2]
+    c01 = G[0, 2] * G[1, 2] - G[0, 1] * G[2, 2]
+    c02 = G[0, 1] * G[1, 2] - G[0, 2] * G[1, 1]
+    det = G[0, 0] * c00 + G[0, 1] * c01 + G[0, 2] * c02
+    if not det > 1e-9 * G[0, 0] * G[1, 1] * G[2, 2]:
+        return False
+    c11 = G[0, 0] * G[2, 2] - G[0, 2] * G[0, 2]
+    c12 = G[0, 1] * G[0, 2] - G[0, 0] * G[1, 2]
+    c22 = G[0, 0] * G[1, 1] - G[0, 1] * G[0, 1]
+    out[0] = (c00 * h[0] + c01 * h[1] + c02 * h[2]) / det
+    out[1] = (c01 * h[0] + c11 * h[1] + c12 * h[2]) / det
+    out[2] = (c02 * h[0] + c12 * h[1] + c22 * h[2]) / det
+    return True
+
+
+@njit(nogil=True, cache=True)
+def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
+    """Least squares on the D observations of v; false where they do not determine one."""
+    G = np.zeros((3, 3))
+    h = np.zeros(3)
+    count = 0
+    for m in range(n):
+        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
+        if abs(excess) <= T * x[m]:
+            b0, b1, b2 = np.float64(a0[m]), np.float64(a1[m]), np.float64(a2[m])
+            G[0, 0] += b0 * b0
+            G[0, 1] += b0 * b1
+            G[0, 2] += b0 * b2
+            G[1, 1] += b1 * b1
+            G[1, 2] += b1 * b2
+            G[2, 2] += b2 * b2
+            h[0] += b0 * x[m]
+            h[1] += b1 * x[m]
+            h[2] += b2 * x[m]
+            count += 1
+    return count >= 3 and _solve(G, h, out)
+
+
+@njit(nogil=True, cache=True)
+def _sample(x, a0, a1, a2, n, state, out):  # pragma: no cover
+    """Exact fit to three random observations; false where their factors lie near a plane."""
+    state, r0 = _next(state)
+    state, r1 = _next(state)
+    state, r2 = _next(state)
+    i, j, k = int(r0 % np.uint64(n)), int(r1 % np.uint64(n - 1)), int(r2 % np.uint64(n - 2))
+    j += j >= i
+    low, high = min(i, j), max(i, j)
+    k += k >= low
+    k += k >= high
+    # columns of the adjugate are cross products of the rows of A
+    u0, u1, u2 = (
+        a1[j] * a2[k] - a2[j] * a1[k],
+        a2[j] * a0[k] - a0[j] * a2[k],
+        a0[j] * a1[k] - a1[j] * a0[k],
+    )
+    det = a0[i] * u0 + a1[i] * u1 + a2[i] * u2
+    norms = (
+        (a0[i] ** 2 + a1[i] ** 2 + a2[i] ** 2)
+        * (a0[j] ** 2 + a1[j] ** 2 + a2[j] ** 2)
+        * (a0[k] ** 2 + a1[k] ** 2 + a2[k] ** 2)
+    )
+    if not det * det > 1e-4 * norms:
+        return state, False
+    f = x[i] / det
+    g = x[j] / det
+    h = x[k] / det
+    out[0] = f * u0 + g * (a1[k] * a2[i] - a2[k] * a1[i]) + h * (a1[i] * a2[j] - a2[i] * a1[j])
+    out[1] = f * u1 + g * (a2[k] * a0[i] - a0[k] * a2[i]) + h * (a2[i] * a0[j] - a0[i] * a2[j])
+    out[2] = f * u2 + g * (a0[k] * a1[i] - a1[k] * a0[i]) + h * (a0[i] * a1[j] - a1[i] * a0[j])
+    return state, True
+
+
+@njit(nogil=True, cache=True)
+def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
+    """Best v of n lit observations into `best`; returns its score, or UNFIT.
+
+    `best` holds a first guess, or NaN. `tries` holds the samples needed at each share of D, see `consensus_rows`.
+    """
+    score, diffuse, misfit = UNFIT, 0, 0.0
+    v = np.empty(3, np.float32)
+    w = np.empty(3, np.float64)
+    if np.isfinite(best[0]):
+        score, diffuse = _score(x, a0, a1, a2, n, best, T)
+        misfit = _misfit(x, a0, a1, a2, n, best, T)
+    drawn = 0
+    while drawn < min(limit, tries[diffuse * (len(tries) - 1) // n]):
+        drawn += 1
+        state, ok = _sample(x, a0, a1, a2, n, state, v)
+        if not ok:
+            continue
+        for step in range(3):
+            s, d = _score(x, a0, a1, a2, n, v, T)
+            if s < score:
+                break
+            e = _misfit(x, a0, a1, a2, n, v, T)
+            if s > score or e < misfit:
+                score, diffuse, misfit = s, d, e
+                best[:] = v
+            elif step > 0:
+                break
+            if not _refit(x, a0, a1, a2, n, v, T, w):
+                break
+            v[0], v[1], v[2] = w[0], w[1], w[2]
+    return score
+
+
+@njit(nogil=True, cache=True)
+def consensus_rows(X, columns, A, T, Ts, tries, limit, seed, out, score, start, stop):  # pragma: no cover
+    """Fit rows start..stop by adaptive sample consensus.
+
+    Args:
+        X: (M,N) float32 observations; row r of the problem is column `columns[r]` of X.
+        columns: (R,) int64.
+        A: (3,M) float32 factors; an observation whose factors are NaN is left out.
+        T, Ts: float32 thresholds.
+        tries: (n,) int64 samples needed against the share of D among the lit, 0 to 1.
+        limit: the most samples to draw.
+        seed: uint64; each row draws its own sequence from it and its column number.
+        out: (R,3) float32; first guess (or NaN) in, winner out; NaN where fewer than 3 are lit.
+        score: (R,) int32, written: D - U among the lit.
+    """
+    M = X.shape[0]
+    x = np.empty(M, np.float32)
+    a0 = np.empty(M, np.float32)
+    a1 = np.empty(M, np.float32)
+    a2 = np.empty(M, np.float32)
+    for r in range(start, stop):
+        column = columns[r]
+        n = 0
+        for m in range(M):
+            value = X[m, column]
+            if value >= Ts and value > 0 and np.isfinite(A[0, m]):
+                x[n], a0[n], a1[n], a2[n] = value, A[0, m], A[1, m], A[2, m]
+                n += 1
+        if n < 3:
+            out[r] = np.nan
+            score[r] = UNFIT
+            continue
+        state = np.uint64(seed) ^ (np.uint64(column) * np.uint64(0xD1342543DE82EF95))
+        score[r] = _fit(x, a0, a1, a2, n, T, tries, limit, state, out[r])
+        if score[r] == UNFIT:
+            out[r] = np.nan

@@ -1,0 +1,48 @@
+"""Label maps of whole images by Eq. (3), at the speed of memory."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .blocks import run_blocks
+from .factors import Thresholds
+from .kernels import label_rows
+
+BLOCK = 1 << 17
+
+
+def label_images(
+    images: NDArray[np.float32],
+    linearized_bases: NDArray[np.float32],
+    coefficients: NDArray[np.float64],
+    mask: NDArray[np.bool_],
+    thresholds: Thresholds,
+    *,
+    threads: int | None = None,
+) -> NDArray[np.uint8]:
+    """Label maps of K images.
+
+    Args:
+        images: (K,H,W), fraction of full scale.
+        linearized_bases: (3,H,W) signed.
+        coefficients: (K,3).
+        mask: (H,W).
+
+    Returns:
+        (K,H,W) Factor codes, the same as `factors.classify` gives; OUTSIDE where the mask is false.
+    """
+    flat = images.reshape(len(images), -1)
+    bases = np.ascontiguousarray(linearized_bases).reshape(3, -1)
+    c = coefficients.astype(np.float32)
+    labels = np.empty(flat.shape, np.uint8)
+    count = flat.shape[1]
+    blocks = -(-count // BLOCK)
+    T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
+
+    def work(start: int, stop: int) -> None:
+        for job in range(start, stop):
+            k, first = job // blocks, job % blocks * BLOCK
+            last = min(first + BLOCK, count)
+            label_rows(flat[k], bases, c[k], mask.reshape(-1), T, Ts, labels[k], first, last)
+
+    run_blocks(work, len(flat) * blocks, max(1, blocks), threads=threads)
+    return labels.reshape(images.shape)

@@ -1,0 +1,123 @@
+"""Step 2: linearized bases of every pixel, (l1, l2, l3) by Eq. (6)."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel, Options, Progress
+from .blocks import run_blocks
+from .coefficients import KEEP, draw_samples
+from .consensus import stopping_table
+from .errors import DegenerateError
+from .factors import Thresholds
+from .kernels import centre_rows, consensus_rows, support_rows
+from .stack import ImageStack
+
+BLOCK = 4096
+
+Work = Callable[[int, int, NDArray[np.float32]], None]
+
+
+def linearize(
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    base_images: tuple[int, int, int],
+    thresholds: Thresholds,
+    options: Options,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> NDArray[np.float32]:
+    """Linearized bases of all mask pixels.
+
+    `robust` samples among the images in which a pixel is lit until enough is known, then fits
+    its D observations; the published methods draw `options.samples` triples among all images but
+    the bases, the same for all pixels.
+
+    Returns:
+        (3,H,W) signed, fraction of full scale; 0 outside the mask; NaN where `robust` finds a
+        pixel lit in fewer than three images, which determines nothing.
+
+    Raises:
+        DegenerateError: no three images determine a candidate.
+        Cancelled: `cancel` said so.
+    """
+    _, H, W = stack.shape
+    bases = np.zeros((3, H * W), np.float32)
+    if options.method == "robust":
+        work = consensus_work(stack, coefficients, thresholds, options)
+    else:
+        work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
+
+    def block(start: int, stop: int) -> None:
+        out = np.full((stop - start, 3), np.nan, np.float32)
+        work(start, stop, out)
+        bases[:, stack.pixels[start:stop]] = out.T
+
+    run_blocks(
+        block,
+        len(stack.pixels),
+        BLOCK,
+        threads=threads,
+        stage="linearize",
+        progress=progress,
+        cancel=cancel,
+    )
+    return bases.reshape(3, H, W)
+
+
+def consensus_work(
+    stack: ImageStack, coefficients: NDArray[np.float64], thresholds: Thresholds, options: Options
+) -> Work:
+    """Adaptive consensus on one block of pixels, in the frame where lights are well spread."""
+    X = stack.images.reshape(len(stack.images), -1)
+    # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
+    q, r = np.linalg.qr(coefficients)
+    scale = np.sqrt(len(q) / 3)
+    A = np.ascontiguousarray((q * scale).T, np.float32)
+    back = (np.linalg.inv(r) * scale).T
+    tries = stopping_table(options.samples)
+    T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
+
+    def work(start: int, stop: int, out: NDArray[np.float32]) -> None:
+        pixels = stack.pixels[start:stop]
+        score = np.empty(len(pixels), np.int32)
+        seed, limit = np.uint64(options.seed), options.samples
+        consensus_rows(X, pixels, A, T, Ts, tries, limit, seed, out, score, 0, len(pixels))
+        out[:] = out @ back
+
+    return work
+
+
+def shared_samples_work(
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    base_images: tuple[int, int, int],
+    thresholds: Thresholds,
+    options: Options,
+) -> Work:
+    """Shared samples on one block of pixels, the winner by support or by centre of gravity."""
+    X = stack.images.reshape(len(stack.images), -1)
+    others = np.setdiff1d(np.arange(len(X)), base_images)
+    rng = np.random.default_rng([options.seed, 2])
+    drawn, inverses = draw_samples(coefficients[others].T, options.samples, rng)
+    if len(drawn) == 0:
+        raise DegenerateError(
+            "no three images determine the linearized bases: their lights lie in one plane; "
+            "add images with lights outside it"
+        )
+    triples = others[drawn]
+    A = np.ascontiguousarray(coefficients.T, np.float32)
+    keep = int(np.ceil(KEEP * len(triples)))
+    T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
+
+    def work(start: int, stop: int, out: NDArray[np.float32]) -> None:
+        rows = np.ascontiguousarray(X[:, stack.pixels[start:stop]].T)
+        if options.method == "statistical":
+            centre_rows(rows, triples, inverses, keep, out, 0, len(rows))
+        else:
+            support = np.empty(len(rows), np.int32)
+            support_rows(rows, A, triples, inverses, T, Ts, out, support, 0, len(rows))
+
+    return work

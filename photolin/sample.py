@@ -1,0 +1,35 @@
+"""A few thousand pixels that stand for all: where `robust` does its searching."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stack import ImageStack
+
+SAMPLE_PIXELS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Observations of some pixels in all images."""
+
+    images: NDArray[np.float32]
+    """(K,M) one row an image, fraction of full scale."""
+    pixels: NDArray[np.float32]
+    """(M,K) the same, one row a pixel."""
+
+    def thin(self, count: int) -> "Sample":
+        """About `count` of the pixels, evenly spaced."""
+        step = max(1, self.images.shape[1] // count)
+        return Sample(*(np.ascontiguousarray(a) for a in (self.images[:, ::step], self.pixels[::step])))
+
+
+def draw_sample(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> Sample:
+    """At most `count` mask pixels, drawn without replacement, in image order."""
+    pixels = stack.pixels
+    if len(pixels) > count:
+        rng = np.random.default_rng(seed)
+        pixels = np.sort(rng.choice(pixels, count, replace=False))
+    images = stack.images.reshape(len(stack.images), -1)[:, pixels]
+    return Sample(np.ascontiguousarray(images), np.ascontiguousarray(images.T))
