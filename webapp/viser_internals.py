@@ -74,6 +74,11 @@ def find_input(server: viser.ViserServer, uuid: str) -> Any | None:
     return None
 
 
+def widget_id(handle: Any) -> str:
+    """The name under which the page and the server speak of a widget."""
+    return handle._impl.uuid
+
+
 def has_command(server: viser.ViserServer, uuid: str) -> bool:
     """Whether `uuid` is an entry of a command palette."""
     owners = (server, *server.get_clients().values())

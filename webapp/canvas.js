@@ -1,0 +1,285 @@
+// The 2D view inside viser's page: canvas.py sends this file, then calls window.openCanvas.
+//
+// viser has no 2D camera, so this works on the objects that its client exposes for its own browser
+// tests (__viserMutable, __viserTestpoints). The picture is a plane that the camera faces squarely:
+// its image on screen is a similarity, described by {scale, left, top} in CSS pixels.
+"use strict";
+
+window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => {
+  window.photolin?.close();
+
+  const TRUCK = 2, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
+  const NEAREST = 1003; // three.js NearestFilter
+  const MARGIN = 0.98, GRID_SCALE = 16, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
+  const HOVER_MS = 50;
+  const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
+
+  const viewer = window.__viserMutable;
+  const { canvas, camera, scene } = viewer;
+  const worldPixel = worldHeight / rows;
+  const closing = new AbortController();
+  const listen = (target, type, listener, capture = false) =>
+    target.addEventListener(type, listener, { capture, signal: closing.signal });
+  const send = (uuid, value) =>
+    viewer.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value } });
+
+  // --- camera ---
+
+  let size = null; // [width, height] of the canvas that the camera was placed for
+  let fitted = null; // pose that fit() chose, to stay fitted when the window changes
+  let peeking = false; // space bar held: without overlay
+
+  const focalLength = () => canvas.clientHeight / 2 / Math.tan((camera.fov * Math.PI) / 360);
+  const distanceAt = (scale) => (focalLength() * worldPixel) / scale;
+  const fitScale = () =>
+    MARGIN * Math.min(canvas.clientWidth / columns, canvas.clientHeight / rows);
+
+  /** Axes of the picture in three.js coordinates: right, down, into the picture, and its centre. */
+  function axes() {
+    const m = viewer.nodeRefFromName[planes[0]].matrixWorld;
+    const vectors = [0, 1, 2].map((i) => camera.position.clone().setFromMatrixColumn(m, i));
+    return [...vectors, camera.position.clone().setFromMatrixPosition(m)];
+  }
+
+  /** Look squarely at `target` from `distance`, and forbid any rotation from there. */
+  function place(target, distance) {
+    const controls = viewer.cameraControl;
+    const [, down, into] = axes();
+    const position = target.clone().addScaledVector(into, -distance);
+    Object.assign(controls, {
+      minAzimuthAngle: -Infinity, maxAzimuthAngle: Infinity, minPolarAngle: 0, maxPolarAngle: Math.PI,
+      minDistance: distanceAt(Math.max(CLOSEST, 4 * fitScale())),
+    });
+    viewer.configuredMaxOrbitDistance = controls.maxDistance = distanceAt(fitScale() / 8);
+    camera.up.copy(down).negate();
+    controls.updateCameraUp();
+    controls.setPosition(position.x, position.y, position.z, false);
+    controls.setTarget(target.x, target.y, target.z, false);
+    controls.minAzimuthAngle = controls.maxAzimuthAngle = controls.azimuthAngle;
+    controls.minPolarAngle = controls.maxPolarAngle = controls.polarAngle;
+    size = [canvas.clientWidth, canvas.clientHeight];
+    viewer.requestRender();
+  }
+
+  function pose() {
+    const controls = viewer.cameraControl;
+    return { target: controls.getTarget(camera.position.clone()), distance: controls.distance };
+  }
+
+  function fit() {
+    place(axes()[3], distanceAt(fitScale()));
+    fitted = pose();
+  }
+
+  /** One image pixel on one pixel of the device, around the present centre, edges on edges. */
+  function oneToOne() {
+    const [right, down, , centre] = axes();
+    const offset = pose().target.sub(centre).divideScalar(worldPixel);
+    const snap = (along, pixels, deviceSize) =>
+      Math.round(along - (pixels - deviceSize) / 2) + (pixels - deviceSize) / 2;
+    const x = snap(offset.dot(right), columns, canvas.width);
+    const y = snap(offset.dot(down), rows, canvas.height);
+    const target = centre.addScaledVector(right, x * worldPixel).addScaledVector(down, y * worldPixel);
+    place(target, distanceAt(1 / window.devicePixelRatio));
+  }
+
+  function followSize() {
+    const { target, distance } = pose();
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (width === size[0] && height === size[1]) return;
+    const stillFitted =
+      fitted && Math.abs(distance / fitted.distance - 1) < 1e-6 &&
+      target.distanceTo(fitted.target) < 1e-6 * distance;
+    if (stillFitted) fit();
+    else place(target, (distance * height) / size[1]); // the same scale as before
+  }
+
+  function similarity() {
+    const [right, down, into, centre] = axes();
+    const offset = centre.sub(camera.position);
+    const zoom = focalLength() / offset.dot(into);
+    const scale = zoom * worldPixel;
+    return {
+      scale,
+      left: canvas.clientWidth / 2 + zoom * offset.dot(right) - (scale * columns) / 2,
+      top: canvas.clientHeight / 2 + zoom * offset.dot(down) - (scale * rows) / 2,
+    };
+  }
+
+  // --- before each frame ---
+
+  function beforeRender() {
+    if (!viewer.nodeRefFromName[planes[0]] || !viewer.cameraControl) return;
+    if (size === null) configure();
+    else followSize();
+    planes.forEach((name, order) =>
+      viewer.nodeRefFromName[name]?.traverse((mesh) => {
+        if (!mesh.isMesh || !("map" in mesh.material)) return;
+        const { material } = mesh;
+        mesh.visible = Boolean(material.map) && !(peeking && order > 0);
+        mesh.renderOrder = order; // planes lie in one another: drawn in turn, without depth
+        material.depthTest = material.depthWrite = false;
+        if (material.map && material.map.magFilter !== NEAREST) {
+          material.map.magFilter = NEAREST;
+          material.map.needsUpdate = true;
+        }
+      }),
+    );
+    drawMarks();
+  }
+
+  function configure() {
+    Object.assign(camera, { fov: 30, near: 1e-4, far: 1e4 });
+    camera.updateProjectionMatrix();
+    const controls = viewer.cameraControl;
+    controls.mouseButtons.left = controls.mouseButtons.right = TRUCK;
+    controls.touches.one = TOUCH_TRUCK;
+    controls.touches.two = controls.touches.three = TOUCH_DOLLY_TRUCK;
+    controls.dollyToCursor = true;
+    fit();
+  }
+
+  // --- marks drawn over the picture ---
+
+  const layer = document.createElement("div");
+  layer.style.cssText = "position:absolute;inset:0;overflow:hidden;pointer-events:none";
+  canvas.parentElement.append(layer);
+  const grid = layer.appendChild(document.createElement("div"));
+  const marks = []; // {element, row, column}
+  const RING =
+    "position:absolute;box-sizing:border-box;border:2px solid #fff;" +
+    "outline:1px solid #000;box-shadow:inset 0 0 0 1px #000";
+  const PIN =
+    "position:absolute;padding:0 4px;border-radius:8px;font:600 11px/16px system-ui;" +
+    "color:#fff;background:#000c;border:1px solid #fff;transform:translate(6px,-22px)";
+
+  /** Marks: [row, column, text] each; a mark without text rings its pixel. */
+  function setMarks(list) {
+    marks.splice(0).forEach((mark) => mark.element.remove());
+    for (const [row, column, text] of list) {
+      const element = layer.appendChild(document.createElement("div"));
+      element.className = text ? "photolin-pin" : "photolin-marker";
+      element.style.cssText = text ? PIN : RING;
+      element.textContent = text;
+      marks.push({ element, row, column, ring: !text });
+    }
+    viewer.requestRender();
+  }
+
+  function drawMarks() {
+    const { scale, left, top } = similarity();
+    for (const { element, row, column, ring } of marks) {
+      const side = ring ? Math.max(scale + 4, 13) : 0;
+      element.style.left = `${left + (column + 0.5) * scale - side / 2}px`;
+      element.style.top = `${top + (row + 0.5) * scale - side / 2}px`;
+      if (ring) element.style.width = element.style.height = `${side}px`;
+    }
+    grid.hidden = scale < GRID_SCALE;
+    if (grid.hidden) return;
+    const x = Math.max(left, 0), y = Math.max(top, 0);
+    const line = "rgba(128,128,128,.45) 1px,transparent 1px";
+    grid.style.cssText =
+      `position:absolute;left:${x}px;top:${y}px;` +
+      `width:${left + columns * scale - x}px;height:${top + rows * scale - y}px;` +
+      `max-width:100%;max-height:100%;` +
+      `background:linear-gradient(90deg,${line}) ${left - x}px 0/${scale}px 100%,` +
+      `linear-gradient(${line}) 0 ${top - y}px/100% ${scale}px`;
+  }
+
+  // --- pointer and keys ---
+
+  let hovered = "", hoverTimer = null;
+
+  function hover(position) {
+    if (position === hovered) return;
+    hovered = position;
+    hoverTimer ??= setTimeout(() => {
+      hoverTimer = null;
+      send(hoverId, hovered);
+    }, HOVER_MS);
+  }
+
+  function pixelUnder(event) {
+    if (size === null) return "";
+    const box = canvas.getBoundingClientRect();
+    const { scale, left, top } = similarity();
+    const row = Math.floor((event.clientY - box.top + 0.5 - top) / scale);
+    const column = Math.floor((event.clientX - box.left + 0.5 - left) / scale);
+    const inside = row >= 0 && row < rows && column >= 0 && column < columns;
+    return inside ? `${row},${column}` : "";
+  }
+
+  /** Whether the focused widget uses this key itself. */
+  function isForWidget({ key, target }) {
+    const kind = target.tagName === "INPUT" ? target.type : target.tagName;
+    if (target.isContentEditable || /^(TEXTAREA|SELECT|text|number|search)$/.test(kind)) return true;
+    if (target === document.body || target === canvas) return false;
+    const movable = /^(slider|tab|radio|option|listbox)$/.test(target.getAttribute?.("role") ?? kind);
+    return key === " " || key === "Enter" || key === "Tab" || (movable && key.startsWith("Arrow"));
+  }
+
+  let keysSent = 0;
+  const local = { f: fit, g: oneToOne, " ": () => peek(true) };
+
+  function peek(on) {
+    peeking = on;
+    viewer.requestRender();
+  }
+
+  function onKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
+    const action = local[event.key.toLowerCase()];
+    if (action) {
+      event.preventDefault();
+      if (!event.repeat && size !== null) action();
+    } else if (event.key.length === 1 || event.key.startsWith("Arrow") || event.key === "Escape") {
+      send(keyId, `${++keysSent} ${event.key}`); // numbered: the same key again is a new value
+    }
+  }
+
+  listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
+  listen(canvas, "pointerleave", () => hover(""));
+  listen(canvas, "dblclick", () => size !== null && fit());
+  listen(window, "keydown", onKey, true);
+  listen(window, "keyup", (event) => event.key === " " && peeking && peek(false), true);
+  listen(window, "blur", () => peeking && peek(false));
+  // viser moves its camera by listeners on `document`, even while a slider has the focus: stop the
+  // keys one step below, after every widget has had them.
+  listen(document.documentElement, "keydown", (event) => {
+    if (CAMERA_KEYS.test(event.code)) event.stopPropagation();
+  });
+
+  // --- settings of the page ---
+
+  // viser lowers the resolution on slow machines, which blurs pixels.
+  const fixResolution = () =>
+    window.__viserTestpoints.devSettings.set({
+      fixedDpr: window.devicePixelRatio,
+      enableOrbitCrosshair: false,
+    });
+  fixResolution();
+  listen(window, "resize", fixResolution);
+
+  // The note on software WebGL covers the picture.
+  for (const note of document.querySelectorAll(".mantine-Notification-root")) {
+    if (note.textContent.includes("Software WebGL")) note.querySelector("button")?.click();
+  }
+
+  // "Reset View" and changes of the world's orientation end here.
+  Object.defineProperty(viewer, "resetCameraPose", {
+    configurable: true,
+    get: () => () => size !== null && fit(),
+    set: () => {},
+  });
+  scene.onBeforeRender = beforeRender;
+  viewer.requestRender();
+
+  function close() {
+    closing.abort();
+    clearTimeout(hoverTimer);
+    layer.remove();
+    scene.onBeforeRender = () => {};
+  }
+
+  window.photolin = { fit, oneToOne, setMarks, similarity, close };
+};

@@ -1,0 +1,158 @@
+"""The 2D canvas of one tab: a picture, an overlay on it, marks, and the pixel under the pointer.
+
+viser draws 3D scenes, so the picture is a plane that the camera faces squarely; `canvas.js` keeps
+it so in the page (drag pans, wheel zooms at the pointer, nothing rotates, pixels stay square) and
+fits it, at first and on double click. Pixels are (row, column) throughout.
+
+Callbacks run one at a time on viser's event loop, which all tabs share: they must return at once.
+"""
+
+import functools
+import math
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import numpy as np
+import viser
+
+from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
+
+WORLD_HEIGHT = 10.0
+"""Height of the picture in viser's world, whatever its pixels."""
+_PLANES = ("/canvas/base", "/canvas/overlay")
+
+Pixel = tuple[int, int]
+"""(row, column)."""
+
+
+class Canvas:
+    """The picture plane of one client; its parts are freed with the client."""
+
+    def __init__(self, client: viser.ClientHandle, height: int, width: int) -> None:
+        """An empty canvas for pictures of `height` rows and `width` columns."""
+        self._client = client
+        self._shape = (height, width)
+        self._marker: Pixel | None = None
+        self._pins: tuple[tuple[int, int, str], ...] = ()
+        self._base, self._overlay = (
+            client.scene.add_image(
+                name,
+                np.zeros((1, 1, 4), np.uint8),
+                render_width=WORLD_HEIGHT * width / height,
+                render_height=WORLD_HEIGHT,
+                format="png",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for name in _PLANES
+        )
+        self._hover = client.gui.add_text("hover", "", visible=False)
+        self._key = client.gui.add_text("key", "", visible=False)
+        run_javascript(client, _javascript())
+        options = {
+            "rows": height,
+            "columns": width,
+            "planes": _PLANES,
+            "worldHeight": WORLD_HEIGHT,
+            "hoverId": widget_id(self._hover),
+            "keyId": widget_id(self._key),
+        }
+        call_javascript(client, "window.openCanvas", options)
+
+    def set_base(self, encoded: bytes, image_format: Literal["jpeg", "png"]) -> None:
+        """Show an encoded (H, W) picture; it may have any resolution of the same shape."""
+        set_encoded(self._base, encoded, image_format)
+
+    def set_overlay(self, encoded: bytes | None) -> None:
+        """Lay a PNG with transparency over the picture; None removes it."""
+        if encoded is not None:
+            set_encoded(self._overlay, encoded, "png")
+        if self._overlay.visible != (encoded is not None):
+            self._overlay.visible = encoded is not None
+
+    def set_marker(self, pixel: Pixel | None) -> None:
+        """Ring one pixel (row, column); None removes the ring."""
+        self._marker = pixel
+        self._send_marks()
+
+    def set_pins(self, pins: Sequence[tuple[int, int, str]]) -> None:
+        """Put short texts at pixels, (row, column, text) each, in place of the earlier ones."""
+        self._pins = tuple(pins)
+        self._send_marks()
+
+    def fit(self) -> None:
+        """Show the whole picture, centred in the free part of the window."""
+        call_javascript(self._client, "window.photolin.fit")
+
+    def one_to_one(self) -> None:
+        """Show each image pixel as one pixel of the screen (1 / devicePixelRatio CSS pixels)."""
+        call_javascript(self._client, "window.photolin.oneToOne")
+
+    def on_pick(self, callback: Callable[[Pixel], None]) -> None:
+        """Call back with the pixel that was clicked; clicks beside the picture do nothing."""
+
+        async def clicked(event: viser.SceneClickEvent) -> None:
+            pixel = pixel_on_ray(event.ray_origin, event.ray_direction, self._shape)
+            if pixel is not None:
+                callback(pixel)
+
+        # The ray of a click on the scene is exact, that of a click on a node half a pixel off.
+        # on_click is typed for plain functions only, which would run in parallel and out of order.
+        self._client.scene.on_click()(cast(Any, clicked))
+
+    def on_hover(self, callback: Callable[[Pixel | None], None]) -> None:
+        """Call back with the pixel under the pointer, None beside it, at most 20 times a second."""
+
+        @self._hover.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            callback(pixel_in_text(self._hover.value, self._shape))
+
+    def on_key(self, callback: Callable[[str], None]) -> None:
+        """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
+
+        F (fit), G (1:1) and the space bar (held: no overlay) act in the page and are not reported,
+        nor are keys with Ctrl, Alt or Meta, nor arrows on a focused slider.
+        """
+
+        @self._key.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            callback(self._key.value.partition(" ")[2])
+
+    def _send_marks(self) -> None:
+        marker = [] if self._marker is None else [(*self._marker, "")]
+        call_javascript(self._client, "window.photolin.setMarks", [*self._pins, *marker])
+
+
+def pixel_on_ray(
+    origin: Sequence[float], direction: Sequence[float], shape: tuple[int, int]
+) -> Pixel | None:
+    """The (row, column) where a ray meets the picture plane z = 0, or None beside it.
+
+    The plane is centred on the world's origin, columns along x, rows along y, WORLD_HEIGHT high.
+    """
+    if direction[2] == 0:
+        return None
+    pixel_side = WORLD_HEIGHT / shape[0]
+    along = -origin[2] / direction[2]
+    column = (origin[0] + along * direction[0]) / pixel_side + shape[1] / 2
+    row = (origin[1] + along * direction[1]) / pixel_side + shape[0] / 2
+    if not (math.isfinite(row) and math.isfinite(column)):
+        return None
+    return _inside((math.floor(row), math.floor(column)), shape)
+
+
+def pixel_in_text(text: str, shape: tuple[int, int]) -> Pixel | None:
+    """The pixel that the page wrote as "row,column", or None when it is none of the picture."""
+    numbers = re.fullmatch(r"([0-9]{1,6}),([0-9]{1,6})", text)
+    return _inside((int(numbers[1]), int(numbers[2])), shape) if numbers else None
+
+
+def _inside(pixel: Pixel, shape: tuple[int, int]) -> Pixel | None:
+    return pixel if 0 <= pixel[0] < shape[0] and 0 <= pixel[1] < shape[1] else None
+
+
+@functools.cache
+def _javascript() -> str:
+    return Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
