@@ -1,0 +1,262 @@
+"""The command line: six verbs, one line for whatever goes wrong.
+
+Exit status: 0 done, 1 a fault of photolin, 2 something the user can mend, 130 stopped by Ctrl-C.
+"""
+
+import functools
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+from .analysis import METHODS, Analysis, Options, Progress
+from .console import complain, parse, progress_bar, run_summary, stack_summary, thresholds
+from .errors import InputError, OutputError
+from .evaluate import Evaluation, format_evaluation
+from .evaluate import evaluate as measure
+from .export import (
+    CONTENTS,
+    Contents,
+    check_output,
+    export_files,
+    is_result,
+    load_result,
+    load_result_stack,
+    program_version,
+    save_result,
+    write_file,
+)
+from .load import LoadOptions, load_stack
+from .paper import compare_with_paper
+from .stack import ImageStack
+from .synthetic import Truth, load_truth, render_scene, write_scene
+
+COMMAND: ContextVar[str] = ContextVar("command")
+"""The command line being run, as a shell would take it."""
+VERBS: dict[str, Callable[..., Callable[[], None]]] = {}
+"""Name of each verb and what makes its call."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line (without the program's name) and return its exit status."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        if arguments == ["--version"]:
+            print(f"photolin {program_version()}")
+            return 0
+        COMMAND.set(shlex.join(["photolin", *arguments]))
+        parse(VERBS, arguments)()
+        sys.stdout.flush()
+    except SystemExit:  # --help
+        return 0
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (Exception, KeyboardInterrupt) as error:
+        return complain(error)
+    return 0
+
+
+def verb(function: Callable[..., None]) -> Callable[..., None]:
+    """Add a verb; parsing gives the call instead of making it, so errors keep apart."""
+
+    @functools.wraps(function)
+    def bind(*args: object, **kwargs: object) -> Callable[[], None]:
+        return functools.partial(function, *args, **kwargs)
+
+    VERBS[function.__name__] = bind
+    return function
+
+
+@verb
+def run(
+    stack: Positional[Path],
+    out: Positional[Path],
+    analysis: Options = Options(),
+    reading: LoadOptions = LoadOptions(),
+    *,
+    threads: int | None = None,
+) -> None:
+    """Linearize a stack, label every pixel, and write OUT/result.npz and OUT/report.json.
+
+    Args:
+        stack: Folder of images, multi-page TIFF, .npy or .npz.
+        out: Folder for the result; made when missing, an earlier result in it is replaced.
+        threads: Processors to use; all when left out. The result does not depend on it.
+    """
+    from .pipeline import analyze
+
+    check_output(out)
+    if stack.resolve() in (out.resolve(), (out / "result.npz").resolve()):
+        raise OutputError(f"{out}: holds the input; another folder is accepted")
+    with progress_bar() as progress:
+        images, seconds = _load(stack, reading, progress)
+        result = analyze(images, analysis, threads=threads, progress=progress)
+    result = replace(result, seconds={"load": seconds, **result.seconds})
+    save_result(result, out, command=COMMAND.get(), stack_path=stack, load_options=reading)
+    print(run_summary(result))
+    print(f"written {out / 'result.npz'} and {out / 'report.json'}")
+
+
+@verb
+def inspect(
+    path: Positional[Path],
+    analysis: Options = Options(),
+    reading: LoadOptions = LoadOptions(),
+    *,
+    stack: Path | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    no_browser: bool = False,
+) -> None:
+    """Look at a stack or a result in the browser.
+
+    A result brings its own analysis and reading options; those given apply to a stack.
+
+    Args:
+        path: What run accepts as stack, or a folder that run wrote.
+        stack: Where the images of a result are now, if they have moved.
+        host: Address to listen on; any but a loopback address asks visitors for a token.
+        port: Port to listen on, 1 to 65535.
+        no_browser: Print the address and do not open a browser.
+    """
+    from webapp.app import serve
+
+    result = load_result(path) if is_result(path) else None
+    with progress_bar() as progress:
+        if result is None:
+            images, _ = _load(path, reading, progress)
+        else:
+            images = load_result_stack(path, stack)
+    options = result.options if result else analysis
+    serve(images, result, options=options, host=host, port=port, open_browser=not no_browser)
+
+
+@verb
+def export(
+    result: Positional[Path],
+    out: Positional[Path],
+    *,
+    what: tuple[Contents, ...] = CONTENTS,
+    image: tuple[int, ...] = (),
+) -> None:
+    """Write the label maps, masks and linearized images of a result as files.
+
+    Args:
+        result: Folder that run wrote.
+        out: Folder for the files; made when missing.
+        what: labels: indexed PNG, pixel values 0 U, 1 D, 2 S, 3 A, 4 C, 255 outside the mask.
+            masks: one PNG of 0 and 255 for each class. linearized: float32 TIFF, signed,
+            fraction of full scale.
+        image: Image numbers from 0; all when left out.
+    """
+    check_output(out)
+    analysis = load_result(result)
+    files: dict[str, bytes] = {}
+    for contents in what or CONTENTS:
+        files |= export_files(analysis, contents, image or None)
+    for name, data in files.items():
+        write_file(out / name, data)
+    print(f"written {len(files)} files to {out}")
+
+
+@verb
+def evaluate(
+    path: Positional[Path],
+    truth: Positional[Path | None] = None,
+    reading: LoadOptions = LoadOptions(),
+    *,
+    T: float | None = None,
+    Ts: float | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+) -> None:
+    """Compare with ground truth: one result, or all three methods on a stack.
+
+    Args:
+        path: Folder that run wrote, or a stack. A stack is analyzed by each method in turn.
+        truth: gt.npz, or the folder that holds it; the stack's own when left out.
+        T: Relative tolerance for a stack, above 0 up to 1; suggested when left out.
+        Ts: Shadow level for a stack, fraction of full scale; suggested when left out.
+        seed: Seed for a stack.
+        threads: Processors to use; all when left out.
+    """
+    from .pipeline import analyze
+
+    if is_result(path):
+        if truth is None:
+            raise InputError(f"{path}: is a result; name its ground truth (gt.npz) after it")
+        result = load_result(path)
+        title = f"{result.title}, {result.options.method}, {thresholds(result)}"
+        print(format_evaluation(_measure(result, load_truth(truth)), title))
+        return
+    answer = load_truth(path if truth is None else truth)
+    with progress_bar() as progress:
+        images, _ = _load(path, reading, progress)
+        each = [Options(method, T, Ts, seed=seed) for method in METHODS]
+        results = [analyze(images, o, threads=threads, progress=progress) for o in each]
+    for result in results:
+        print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
+    print(compare_with_paper({r.options.method: _measure(r, answer) for r in results}))
+
+
+@verb
+def synth(
+    name: Positional[str],
+    out: Positional[Path],
+    *,
+    size: tuple[int, int] | None = None,
+    images: int | None = None,
+    noise: float = 0.0,
+    bits: Literal[8, 16] = 16,
+    ambient: float = 0.0,
+    seed: int = 0,
+) -> None:
+    """Render a scene with exact ground truth: images and gt.npz.
+
+    Args:
+        name: sphere_cone, cup, pot or sphere_obstacles.
+        out: New folder for the images and their truth.
+        size: Rows and columns, 16 to 4096; the scene's own when left out.
+        images: Number of images, one light each, 6 to 1000; the scene's own when left out.
+        noise: Standard deviation of Gaussian noise, fraction of full scale.
+        bits: Bits of a pixel.
+        ambient: Constant light added everywhere, fraction of full scale.
+        seed: Seed of the noise.
+    """
+    scene = render_scene(
+        name, size=size, images=images, seed=seed, noise=noise, bits=bits, ambient=ambient
+    )
+    write_scene(scene, out)
+    K, H, W = scene.stack.shape
+    print(f"written {K} images of {H} x {W} and gt.npz to {out}")
+
+
+@verb
+def info(stack: Positional[Path], reading: LoadOptions = LoadOptions()) -> None:
+    """Say what is read from a stack: size, transfer, mask, lights, brightness of each image.
+
+    Args:
+        stack: What run accepts.
+    """
+    with progress_bar() as progress:
+        images, seconds = _load(stack, reading, progress)
+    print(stack_summary(images))
+    print(f"read in {seconds:.2f} s")
+
+
+def _load(path: Path, reading: LoadOptions, progress: Progress | None) -> tuple[ImageStack, float]:
+    """The stack and the seconds it took to read."""
+    start = time.perf_counter()
+    images = load_stack(path, reading, progress=progress)
+    return images, time.perf_counter() - start
+
+
+def _measure(result: Analysis, truth: Truth) -> Evaluation:
+    return measure(result.labels, result.coefficients, result.linearized_bases, truth)

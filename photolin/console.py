@@ -1,0 +1,141 @@
+"""The terminal's side: parsing, one-line complaints, a progress bar, summaries."""
+
+import io
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
+
+import tyro
+
+from .analysis import Analysis, Progress
+from .errors import OptionError, PhotolinError
+from .factors import OUTSIDE, TITLES
+from .stack import ImageStack
+
+Call = Callable[[], None]
+"""What a command line asks for, ready to be made."""
+
+STYLE = (
+    tyro.conf.DisallowNone,
+    tyro.conf.FlagCreatePairsOff,
+    tyro.conf.OmitArgPrefixes,
+    tyro.conf.PositionalMetavarFromFieldName,
+)
+
+
+def parse(verbs: dict[str, Callable[..., Call]], arguments: Sequence[str]) -> Call:
+    """The call a command line asks for; OptionError in one line instead of tyro's box."""
+    box = io.StringIO()
+    try:
+        with redirect_stderr(box):
+            return tyro.extras.subcommand_cli_from_dict(
+                verbs,
+                prog="photolin",
+                description="Tell diffuse, specular, attached and cast shadow apart.",
+                args=list(arguments),
+                config=STYLE,
+            )
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+    verb = [word for word in arguments[:1] if word in verbs]
+    hint = " ".join(["photolin", *verb, "--help"])
+    raise OptionError(f"{_unbox(box.getvalue())}; {hint} lists what is accepted") from None
+
+
+def complain(error: BaseException) -> int:
+    """Print exactly one line on stderr and return the exit status that goes with it."""
+    match error:
+        case PhotolinError():
+            status, message = 2, str(error)
+        case MemoryError():
+            status, message = 2, "memory is full; --roi reads a part of the images"
+        case KeyboardInterrupt():
+            status, message = 130, "stopped"
+        case _ if os.environ.get("PHOTOLIN_DEBUG") == "1":
+            raise error
+        case _:
+            fault = f"{type(error).__name__}: {error}"
+            status, message = 1, f"{fault} (a fault of photolin; please report it and the command)"
+    print("photolin:", " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+def _unbox(box: str) -> str:
+    """The sentence in tyro's error box, without frame, colours, nested help and type names."""
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line)[2:-2] for line in box.splitlines()[1:-1]]
+    body: list[str] = []
+    for line in lines:
+        if re.fullmatch(r"[─-]{3,}", line.strip()) or line.startswith("Got errors"):
+            break
+        if not line.startswith(" " * 8):
+            body.append(line.strip())
+    sentence = " ".join(" ".join(body).split()).rstrip(".")
+    value = re.fullmatch(
+        r"Error parsing (\S+): no type matching (.+) could be instantiated from \[(.+)\]", sentence
+    )
+    if value is None:
+        return sentence
+    option, accepted, given = (re.sub(r"[{}',]", "", group) for group in value.groups())
+    return f"{option} is {given}; {accepted} is accepted"
+
+
+@contextmanager
+def progress_bar() -> Iterator[Progress]:
+    """A bar on stderr while that is a terminal, nothing otherwise."""
+    from tqdm import tqdm
+
+    layout = "{desc:<14} {percentage:3.0f}% |{bar}| {elapsed}"
+    with tqdm(total=100, disable=None, leave=False, bar_format=layout) as bar:
+
+        def report(stage: str, fraction: float) -> None:
+            bar.set_description_str(stage, refresh=False)
+            bar.update(100 * fraction - bar.n)
+
+        yield report
+
+
+def thresholds(result: Analysis) -> str:
+    return f"T {result.thresholds.T:.4g}, Ts {result.thresholds.Ts:.4g}"
+
+
+def run_summary(result: Analysis) -> str:
+    """What a run decided and found, for people."""
+    inside = result.labels[result.labels != OUTSIDE]
+    shares = ", ".join(f"{title} {(inside == f).mean():.1%}" for f, title in TITLES.items())
+    bases = ", ".join(f"{k} ({result.names[k]})" for k in result.base_images)
+    K, H, W = result.labels.shape
+    return "\n".join(
+        [
+            f"{result.title}: {K} images of {H} x {W}, method {result.options.method}",
+            f"thresholds: {thresholds(result)}",
+            f"base images: {bases}",
+            f"labels: {shares}",
+            *remarks(result),
+            f"seconds: {result.seconds['total']:.2f} (reading {result.seconds['load']:.2f})",
+        ]
+    )
+
+
+def stack_summary(stack: ImageStack) -> str:
+    """What was read: size, mask, lights, remarks, and the brightness of each image."""
+    K, H, W = stack.shape
+    rows = [
+        f"{k:5d}  {image[stack.mask].mean():.4f}  {image[stack.mask].max():.4f}  {name}"
+        for k, (name, image) in enumerate(zip(stack.names, stack.images, strict=True))
+    ]
+    return "\n".join(
+        [
+            f"{stack.title}: {K} images of {H} x {W} (rows x columns)",
+            *remarks(stack),
+            "image  mean    max     name (fractions of full scale, inside the mask)",
+            *rows,
+        ]
+    )
+
+
+def remarks(of: ImageStack | Analysis) -> list[str]:
+    """Notes and warnings, one a line."""
+    return [*of.notes, *(f"warning: {text}" for text in of.warnings)]
