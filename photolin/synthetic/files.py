@@ -15,8 +15,17 @@ from .render import Scene, Truth
 KEYS = tuple(Truth.__dataclass_fields__)
 """The arrays of gt.npz, named as the fields of Truth."""
 
-UNREADABLE = (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error)
-"""What numpy raises for a truncated, damaged, pickled or other file."""
+UNREADABLE = (
+    OSError,
+    EOFError,
+    ValueError,
+    TypeError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy raises for a truncated, damaged, encrypted, pickled or other file."""
 
 README = """{title}: a rendered image stack with exact ground truth (photolin.synthetic)
 {K} images of {H} x {W} pixels (rows x columns), {px_mm:g} mm a pixel; orthographic camera, one
@@ -98,7 +107,7 @@ def load_truth(path: str | os.PathLike[str]) -> Truth:
     if not path.is_file():
         raise InputError(f"{path}: not found; a gt.npz, or the folder that holds one, is accepted")
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             missing = [key for key in KEYS if key not in stored]
             arrays = {key: stored[key] for key in KEYS if key in stored}
     except UNREADABLE as error:
