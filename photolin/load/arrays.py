@@ -1,6 +1,7 @@
 """Stacks saved by numpy."""
 
 import zipfile
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import IO
@@ -8,10 +9,10 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, PhotolinError
 from .folder import check_count
 from .layout import Frame, Layout
-from .pictures import as_picture, check_size, depth_of
+from .pictures import PIXEL_LIMIT, as_picture, check_size, depth_of
 
 SHAPES = "(images, rows, columns) or (images, rows, columns, channels)"
 
@@ -24,7 +25,9 @@ def find_arrays(path: Path) -> Layout:
     """
     try:
         arrays = _read_npz(path) if path.suffix.lower() == ".npz" else {"images": _read_npy(path)}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (PhotolinError, MemoryError):
+        raise
+    except Exception as error:  # zipfile, zlib and numpy raise whatever the broken bytes lead to
         raise InputError(
             f"{path}: is truncated or not a numpy file ({error}); .npy and .npz are accepted"
         ) from error
@@ -39,16 +42,17 @@ def find_arrays(path: Path) -> Layout:
             )
     why = f"{depth_of(images)} array"
     frames = [
-        Frame(name, f"{path}, image {k}", lambda k=k: as_picture(images[k], str(path), why=why))
+        Frame(name, where, partial(as_picture, images[k], where, why=why))
         for k, name in enumerate(names)
+        for where in [f"{path}, image {k}"]
     ]
     return Layout(
         title=path.stem,
         where=path,
         frames=tuple(frames),
         files=(path,),
-        mask=arrays.get("mask"),
-        lights=arrays.get("lights"),
+        masks=(arrays["mask"],) if "mask" in arrays else (),
+        lights=(arrays["lights"],) if "lights" in arrays else (),
     )
 
 
@@ -87,7 +91,11 @@ def _check_header(stream: IO[bytes], path: Path, key: str, images: bool) -> None
             f"{path}: {key} is pickled Python objects, which could run code when read; "
             "plain numbers are accepted"
         )
-    if images and len(shape) not in (3, 4):
+    if key != "names" and dtype.kind not in "buif":
+        raise InputError(f"{path}: {key} is of type {dtype}; integers and floats are accepted")
+    if images and (len(shape) not in (3, 4) or not 1 <= prod(shape[3:]) <= 4):
         raise InputError(f"{path}: {key} is of shape {shape}; {SHAPES} is accepted")
-    count, rows, columns = shape[:3] if images else (1, 1, prod(shape))
-    check_size(rows, columns, f"{path}, {key}", count)
+    if images:
+        check_size(shape[1], shape[2], f"{path}, {key}", shape[0])
+    elif prod(shape) * dtype.itemsize > PIXEL_LIMIT * 8:
+        raise InputError(f"{path}: {key} is of shape {shape}, larger than the images can be")

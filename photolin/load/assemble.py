@@ -44,12 +44,15 @@ def load_stack(
         OptionError: the region lies outside the images.
         DegenerateError: the lights lie in one plane.
     """
-    layout = _with_options(find_layout(Path(path)), options)
+    try:
+        layout = _with_options(find_layout(Path(path)), options)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     plan = make_plan(layout, options)
     images, notes = read_images(layout, plan, progress)
     mask, mask_note = _read_mask(layout, plan)
     lights, lights_note = _read_lights(layout, options)
-    extra = [p for p in (*layout.dark, layout.mask, layout.lights) if isinstance(p, Path)]
+    extra = [p for p in (*layout.dark, *layout.masks, *layout.lights) if isinstance(p, Path)]
     return ImageStack(
         images=images,
         mask=mask,
@@ -69,7 +72,8 @@ def find_layout(path: Path) -> Layout:
     """
     accepted = "a folder of images, a multi-page TIFF, .npz or .npy is accepted"
     if path.is_dir():
-        return find_diligent(path) if (path / LIST).is_file() else find_folder(path)
+        diligent = (path / LIST).is_file() or (path / POWERS).is_file()
+        return find_diligent(path) if diligent else find_folder(path)
     if not path.exists():
         raise InputError(f"{path}: does not exist; {accepted}")
     kind = path.suffix.lower()
@@ -83,26 +87,36 @@ def find_layout(path: Path) -> Layout:
 
 def _with_options(layout: Layout, options: LoadOptions) -> Layout:
     """`layout` with the files that `options` name in place of its own."""
-    lights = None if options.lights == "none" else options.lights or layout.lights
-    return replace(
-        layout,
-        mask=layout.mask if options.mask is None else Path(options.mask),
-        dark=layout.dark if options.dark is None else (Path(options.dark),),
-        lights=Path(lights) if isinstance(lights, str) else lights,
-    )
+    if options.lights is not None:
+        lights = () if options.lights == "none" else (Path(options.lights),)
+        layout = replace(layout, lights=lights)
+    if options.mask is not None:
+        layout = replace(layout, masks=(Path(options.mask),))
+    if options.dark is not None:
+        layout = replace(layout, dark=(Path(options.dark),))
+    for option, found in (("mask", layout.masks), ("lights", layout.lights)):
+        if len(found) > 1:
+            names = " and ".join(path.name for path in found[:3] if isinstance(path, Path))
+            raise InputError(
+                f"{layout.where}: {names} could each be the {option} file; name one with the "
+                f"option {option}"
+            )
+    return layout
 
 
 def _read_mask(layout: Layout, plan: Plan) -> tuple[NDArray[np.bool_], str]:
-    """The mask of the region, true where the mask image is above half of its maximum."""
+    """The mask of the region, and where it is from."""
     shape = plan.first.pixels.shape[:2]
-    if layout.mask is None:
+    found = next(iter(layout.masks), None)
+    if found is None:
         mask, source = np.ones(shape, np.bool_), "none, every pixel is used"
-    elif isinstance(layout.mask, Path):
-        bright = read_picture(layout.mask).pixels.max(axis=-1)
-        mask, source = bright > bright.max() / 2, layout.mask.name
-        check_mask(mask, shape, str(layout.mask))
+    elif isinstance(found, Path):
+        # Half of the maximum, whatever it is: edges may be smooth, values 1, 255 or 65025.
+        bright = read_picture(found).pixels.max(axis=-1)
+        mask, source = bright > bright.max() / 2, found.name
+        check_mask(mask, shape, str(found))
     else:
-        mask, source = np.asarray(layout.mask) != 0, f"of {layout.where.name}"
+        mask, source = found != 0, f"of {layout.where.name}"
         check_mask(mask, shape, str(layout.where))
     mask = np.ascontiguousarray(mask[plan.region])
     check_mask(mask, mask.shape, f"{layout.where}, region of interest")
@@ -110,12 +124,14 @@ def _read_mask(layout: Layout, plan: Plan) -> tuple[NDArray[np.bool_], str]:
 
 
 def _read_lights(layout: Layout, options: LoadOptions) -> tuple[NDArray[np.float64] | None, str]:
+    """The lights (K,3), and where they are from."""
     names = tuple(frame.name for frame in layout.frames)
-    if layout.lights is None:
+    found = next(iter(layout.lights), None)
+    if found is None:
         return None, f"lights: {'ignored, as asked' if options.lights == 'none' else 'not given'}"
-    if isinstance(layout.lights, Path):
-        return read_lights(layout.lights, names), f"lights: {layout.lights.name}"
-    lights = np.asarray(layout.lights, np.float64)
+    if isinstance(found, Path):
+        return read_lights(found, names), f"lights: {found.name}"
+    lights = np.atleast_2d(found).astype(np.float64)
     check_lights(lights, len(names), str(layout.where))
     return lights, f"lights: of {layout.where.name}"
 

@@ -1,10 +1,14 @@
 """The layout of the DiLiGenT benchmark (Shi et al., PAMI 2019)."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError
-from .folder import check_count, find_lights, find_mask, sort_files
-from .layout import Layout, file_frame
+from .folder import find_folder
+from .layout import Layout
 from .lights import read_table
 
 LIST = "filenames.txt"
@@ -12,36 +16,36 @@ POWERS = "light_intensities.txt"
 
 
 def find_diligent(folder: Path) -> Layout:
-    """Recognise a folder with ``filenames.txt``: one image name a line, in order of the lights.
+    """Recognise a folder with a list of its images in order of the lights, or with light powers.
 
     Raises:
-        InputError: a listed image is missing, or powers that are not positive or not one a line.
+        InputError: a listed image is missing, powers that are not positive or not one a line, or
+            as for any folder.
     """
-    text = (folder / LIST).read_text(encoding="utf-8", errors="replace")
-    images = [folder / name.strip() for name in text.splitlines() if name.strip()]
-    for path in images:
-        if not path.is_file():
+    listed = _read_list(folder / LIST) if (folder / LIST).is_file() else []
+    layout = find_folder(folder, listed)
+    extra = [folder / name for name in (LIST, POWERS) if (folder / name).is_file()]
+    powers = _read_powers(folder / POWERS, len(layout.frames)) if folder / POWERS in extra else None
+    return replace(layout, files=(*layout.files, *extra), powers=powers)
+
+
+def _read_list(path: Path) -> list[Path]:
+    lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    images = [path.parent / line.strip() for line in lines if line.strip()]
+    for image in images:
+        if not image.is_file():
             raise InputError(
-                f"{folder / LIST}: lists {path.name}, which is not there; "
+                f"{path}: lists {image.name}, which is not there; "
                 "names of existing images are accepted"
             )
-    check_count(len(images), folder / LIST)
-    files, powers = [*images, folder / LIST], None
-    if (folder / POWERS).is_file():
-        files.append(folder / POWERS)
-        _, powers = read_table(folder / POWERS)
-        if len(powers) != len(images) or (powers <= 0).any():
-            raise InputError(
-                f"{folder / POWERS}: holds {len(powers)} powers for {len(images)} images, from "
-                f"{powers.min():g}; a line of three positive numbers for each image is accepted"
-            )
-    return Layout(
-        title=folder.resolve().name,
-        where=folder,
-        frames=tuple(file_frame(path) for path in images),
-        files=tuple(files),
-        dark=tuple(p for p in sort_files(folder)["dark"] if p not in images),
-        mask=find_mask(folder),
-        lights=find_lights(folder),
-        powers=powers,
-    )
+    return images
+
+
+def _read_powers(path: Path, count: int) -> NDArray[np.float64]:
+    _, powers = read_table(path)
+    if len(powers) != count or (powers <= 0).any():
+        raise InputError(
+            f"{path}: holds {len(powers)} powers for {count} images, from {powers.min():g}; "
+            "a line of three positive numbers for each image is accepted"
+        )
+    return powers

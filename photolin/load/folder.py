@@ -2,6 +2,7 @@
 
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
@@ -20,17 +21,17 @@ LIGHTS = ("light_directions.txt", "lights.txt", "lights.npy", "lights.lp")
 """Names of lights files, in order of preference; any other ``.lp`` comes last."""
 
 
-def find_folder(folder: Path) -> Layout:
-    """Recognise the stack of a folder, or of its ``images`` sub-folder.
+def find_folder(folder: Path, listed: Sequence[Path] = ()) -> Layout:
+    """Recognise the stack of a folder, or of its ``images`` sub-folder; or take the files `listed`.
 
     Raises:
-        InputError: no images, too few, or several files that could be the mask or the lights.
+        InputError: no images, too few, or two stacks.
     """
-    images = folder
-    roles = sort_files(folder)
-    if len(roles["image"]) < MIN_IMAGES and (folder / "images").is_dir():
-        images, roles = folder / "images", sort_files(folder / "images")
-    stack, left_out = _largest_group(roles["image"], images)
+    images, roles = folder, sort_files(folder)
+    if len(roles["image"]) < MIN_IMAGES and not listed and (folder / "images").is_dir():
+        images = folder / "images"
+        roles = sort_files(images)
+    stack, left_out = (list(listed), []) if listed else _largest_group(roles["image"], images)
     if not stack:
         raise InputError(f"{images}: holds no images; accepted are {', '.join(READERS)}")
     check_count(len(stack), images)
@@ -40,8 +41,8 @@ def find_folder(folder: Path) -> Layout:
         where=images,
         frames=tuple(file_frame(path) for path in stack),
         files=tuple(stack),
-        dark=tuple(roles["dark"]),
-        mask=find_mask(images) or find_mask(folder),
+        dark=tuple(path for path in roles["dark"] if path not in stack),
+        masks=find_masks(images) or find_masks(folder),
         lights=find_lights(images) or find_lights(folder),
         notes=(note,) if left_out else (),
     )
@@ -72,29 +73,16 @@ def sort_files(folder: Path) -> dict[str, list[Path]]:
     return roles
 
 
-def find_mask(folder: Path) -> Path | None:
-    """The mask file of a folder: the one called mask, or the only one with mask in its name."""
+def find_masks(folder: Path) -> tuple[Path, ...]:
+    """What could be the mask: the file called mask, or all with mask in their name."""
     masks = sort_files(folder)["mask"]
-    named = [path for path in masks if path.stem.lower() == "mask"]
-    return _only(named or masks, folder, "mask")
+    return tuple([path for path in masks if path.stem.lower() == "mask"] or masks)
 
 
-def find_lights(folder: Path) -> Path | None:
-    """The lights file of a folder."""
-    for name in LIGHTS:
-        if (folder / name).is_file():
-            return folder / name
-    return _only(sorted(folder.glob("[!.]*.lp")), folder, "lights")
-
-
-def _only(paths: list[Path], folder: Path, option: str) -> Path | None:
-    if len(paths) > 1:
-        names = ", ".join(path.name for path in paths[:5])
-        raise InputError(
-            f"{folder}: {names} could each be the {option} file; one is accepted, "
-            f"or name it with the option {option}"
-        )
-    return paths[0] if paths else None
+def find_lights(folder: Path) -> tuple[Path, ...]:
+    """What could be the lights: the first name of LIGHTS, or all .lp files."""
+    named = [folder / name for name in LIGHTS if (folder / name).is_file()]
+    return tuple(named[:1] or sorted(folder.glob("[!.]*.lp")))
 
 
 def _role(path: Path, files: list[Path]) -> str:

@@ -34,10 +34,10 @@ class Layout:
     """Every file the frames and powers are read from, for hashing."""
     dark: tuple[Path, ...] = ()
     """Dark frames; their mean is subtracted."""
-    mask: Path | NDArray | None = None
-    """An image file or (H,W)."""
-    lights: Path | NDArray | None = None
-    """A lights file or (K,3)."""
+    masks: tuple[Path | NDArray, ...] = ()
+    """What could be the mask: image files or (H,W)."""
+    lights: tuple[Path | NDArray, ...] = ()
+    """What could be the lights: files or (K,3)."""
     powers: NDArray[np.float64] | None = None
     """(K,3) power of each light in red, green and blue; images are divided by it."""
     notes: tuple[str, ...] = ()

@@ -91,7 +91,7 @@ def _in_order_of(names: tuple[str, ...], labels: list[str], lights: NDArray) -> 
 
 def _read_npy(path: Path) -> NDArray[np.float64]:
     try:
-        return np.load(path, allow_pickle=False).astype(np.float64)
+        return np.atleast_2d(np.load(path, allow_pickle=False).astype(np.float64))
     except (OSError, ValueError, EOFError) as error:
         raise InputError(
             f"{path}: is not a plain array file ({error}); .npy of shape (images, 3) is accepted"

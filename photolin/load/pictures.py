@@ -80,8 +80,6 @@ def as_picture(
     """
     if pixels.ndim == 2:
         pixels = pixels[..., None]
-    if pixels.dtype == np.bool_:
-        pixels, full = pixels.view(np.uint8), 1
     if pixels.ndim != 3 or pixels.shape[2] not in (1, 2, 3, 4) or pixels.dtype.kind not in "uif":
         raise InputError(
             f"{where}: is {pixels.dtype} of shape {pixels.shape}; gray, RGB and RGBA images of "
@@ -117,6 +115,8 @@ def read_page(page: tifffile.TiffPage, where: str) -> Picture:
     check_size(page.imagelength, page.imagewidth, where)
     pixels = page.asarray()
     full = None
+    if pixels.dtype == np.bool_:
+        pixels = pixels.view(np.uint8)
     if page.photometric == tifffile.PHOTOMETRIC.PALETTE and page.colormap is not None:
         pixels = np.moveaxis(page.colormap[:, pixels], 0, -1)
     elif pixels.dtype.kind == "u":

@@ -1,0 +1,93 @@
+"""Files of lights."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from photolin.errors import DegenerateError, InputError
+from photolin.load.lights import read_lights
+
+NAMES = tuple(f"img{k}.png" for k in range(1, 7))
+LIGHTS = np.array(
+    [[0, 0, 1], [0.6, 0, 0.8], [0, 0.6, 0.8], [-0.6, 0, 0.8], [0, -0.6, 0.8], [1, 1, 2]], float
+)
+
+
+def lines(prefix: tuple[str, ...] = ("",) * 6) -> list[str]:
+    return [f"{p} {x} {y} {z}".strip() for p, (x, y, z) in zip(prefix, LIGHTS, strict=True)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n".join(lines()),
+        "6\n" + "\n".join(lines()) + "\n\n",
+        "# x y z\n\n  6\r\n" + "\r\n".join(lines()),
+        "\ufeff" + "\n".join(line.replace(" ", "\t") for line in lines()),
+    ],
+)
+def test_lines_of_three_numbers_are_read_with_their_length(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "lights.txt"
+    path.write_text(text, encoding="utf-8", newline="")
+    np.testing.assert_array_equal(read_lights(path, NAMES), LIGHTS)
+
+
+def test_an_lp_file_is_matched_by_name_and_scaled_to_length_1(tmp_path: Path) -> None:
+    prefix = tuple(f"C:\\my shots\\{name.upper()}" for name in NAMES)
+    shuffled = [lines(prefix)[k] for k in (5, 0, 3, 1, 4, 2)]
+    path = tmp_path / "a.lp"
+    path.write_text("6\n" + "\n".join(shuffled))
+    lights = read_lights(path, NAMES)
+    np.testing.assert_allclose(lights, LIGHTS / np.linalg.norm(LIGHTS, axis=1, keepdims=True))
+
+
+def test_an_lp_file_with_other_names_is_taken_in_order(tmp_path: Path) -> None:
+    path = tmp_path / "a.lp"
+    path.write_text("6\n" + "\n".join(lines(tuple("abcdef"))))
+    np.testing.assert_allclose(read_lights(path, NAMES)[1], [0.6, 0, 0.8])
+
+
+@pytest.mark.parametrize("array", [LIGHTS, LIGHTS.T])
+def test_an_array_may_lie_either_way(tmp_path: Path, array: np.ndarray) -> None:
+    np.save(tmp_path / "l.npy", array)
+    np.testing.assert_array_equal(read_lights(tmp_path / "l.npy", NAMES), LIGHTS)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("\n".join(lines()[:5]), "lights.txt: 5 lights for 6 images; one line of x y z"),
+        ("7\n" + "\n".join(lines()), "announces 7 lights and lists 6"),
+        ("6\n" + "\n".join(lines()).replace("0.6", "0,6"), r"lights.txt, line 3: '0,6 0.0 0.8' is"),
+        ("\n".join([*lines()[:5], "1 2"]), "line 6: '1 2' is not three numbers"),
+        ("\n".join([*lines()[:5], "nan 0 1"]), "line 6: 'nan 0 1' is not three numbers"),
+        ("\n".join([*lines()[:5], "0 0 0"]), "lights.txt: a light is zero or not finite"),
+        ("", "lights.txt: holds no lines of three numbers"),
+    ],
+)
+def test_a_line_that_cannot_be_used_is_named(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "lights.txt").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_lights(tmp_path / "lights.txt", NAMES)
+
+
+def test_lights_in_one_plane_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "lights.txt").write_text("\n".join(f"0 {k} 1" for k in range(6)))
+    with pytest.raises(DegenerateError, match=r"lights\.txt: the lights lie in one plane"):
+        read_lights(tmp_path / "lights.txt", NAMES)
+
+
+def test_files_that_hold_no_lights_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_bytes(b"\xff\xfe\x00\x81")
+    np.save(tmp_path / "a.npy", np.array([{}], object), allow_pickle=True)
+    np.save(tmp_path / "b.npy", np.array(1.0))
+    for name, words in (
+        ("a.txt", "is not text"),
+        ("a.npy", "is not a plain array file"),
+        ("b.npy", "1 lights for 6 images"),
+        ("c.txt", "cannot be read"),
+        ("c.npy", "is not a plain array file"),
+    ):
+        with pytest.raises(InputError, match=f"{name}: {words}"):
+            read_lights(tmp_path / name, NAMES)
