@@ -32,7 +32,7 @@ class Options:
     base_images: tuple[int, int, int] | None = None
     """Three image numbers, from 0; chosen automatically when left out."""
     samples: int = 500
-    """Random samples for each image and pixel; `robust` stops by itself and takes it as the limit."""
+    """Random samples for each image and pixel; for `robust`, which stops by itself, the limit."""
     seed: int = 0
     """Seed of all random choices; the same seed gives the same bytes."""
 
@@ -48,7 +48,8 @@ class Options:
             len(set(self.base_images)) != 3 or min(self.base_images) < 0
         ):
             raise OptionError(
-                f"base_images is {self.base_images}; accepted are three different image numbers from 0"
+                f"base_images is {self.base_images}; "
+                "accepted are three different image numbers from 0"
             )
 
 

@@ -17,6 +17,8 @@ from .sample import Sample
 
 MAX_TRIPLES = 3000
 """All triples of up to 27 images; a random choice of more."""
+PIXELS = 800
+CHUNK = 256
 
 
 def choose_bases(
@@ -35,7 +37,7 @@ def choose_bases(
         DegenerateError: no three images share lit pixels.
     """
     triples = draw_triples(len(sample.images), MAX_TRIPLES, np.random.default_rng(seed))
-    score = np.array([score_triple(sample.images, t, Ts, lights) for t in triples])
+    score = score_triples(sample.thin(PIXELS).images, triples, Ts, lights)
     if not score.max() > 0:
         raise DegenerateError(
             f"no three images are lit at the same pixels (i >= Ts = {Ts:g}); "
@@ -58,22 +60,30 @@ def draw_triples(count: int, limit: int, rng: np.random.Generator) -> NDArray[np
     return np.sort([rng.choice(count, 3, replace=False) for _ in range(limit)], axis=1)
 
 
-def score_triple(
+def score_triples(
     images: NDArray[np.float32],
-    triple: NDArray[np.int64],
+    triples: NDArray[np.int64],
     Ts: float,
     lights: NDArray[np.float64] | None,
-) -> float:
-    """Share of pixels lit in all three, times how far from a plane their lights lie, 0 to 1."""
-    values = images[triple]
-    common = (values >= Ts).all(axis=0) & (values > 0).all(axis=0)
-    if common.sum() < 10:
-        return 0.0
-    if lights is not None:
-        s = lights[triple] / np.linalg.norm(lights[triple], axis=1, keepdims=True)
-        return float(common.mean() * abs(np.linalg.det(s)))
-    # the square root caps the pull of highlights, which would pass for independence
-    v = np.minimum(values[:, common], 3 * np.median(values[:, common], axis=1, keepdims=True))
-    gram = v @ v.T
-    scale = np.sqrt(np.diag(gram))
-    return float(common.mean() * np.sqrt(max(np.linalg.det(gram / np.outer(scale, scale)), 0.0)))
+) -> NDArray[np.float64]:
+    """(n,) share of pixels lit in all three, times how far from a plane the lights lie, 0 to 1."""
+    lit = (images >= Ts) & (images > 0)
+    # highlights would pass for independence
+    tops = 3 * np.ma.median(np.ma.masked_array(images, ~lit), axis=1, keepdims=True).filled(0)
+    values = np.where(lit, np.minimum(images, tops), 0)
+    scores = []
+    for start in range(0, len(triples), CHUNK):
+        chunk = triples[start : start + CHUNK]
+        common = lit[chunk].all(axis=1)
+        v = values[chunk] * common[:, None]
+        s = v if lights is None else lights[chunk]
+        spread = gram_determinants(s @ s.transpose(0, 2, 1))
+        scores.append(np.where(common.sum(axis=1) < 10, 0, common.mean(axis=1) * np.sqrt(spread)))
+    return np.concatenate(scores)
+
+
+def gram_determinants(gram: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(n,) determinants of (n,3,3) Gram matrices of vectors scaled to length 1, 0 to 1."""
+    gram = gram.astype(np.float64)
+    scale = np.prod(np.diagonal(gram, axis1=1, axis2=2), axis=1)
+    return np.maximum(np.linalg.det(gram), 0) / np.maximum(scale, np.finfo(np.float64).tiny)

@@ -1,4 +1,4 @@
-"""Step 1 as published: coefficients of every image from random samples of three pixels (Eq. 2, 5)."""
+"""Step 1 as published: coefficients from random samples of three pixels (Eq. 2 and 5)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +58,7 @@ def estimate_coefficients(
         else:
             support_rows(X, A, triples, inverses, T, Ts, out, support, start, stop)
 
-    run_blocks(
-        work, K, 1, threads=threads, stage="coefficients", progress=progress, cancel=cancel
-    )
+    run_blocks(work, K, 1, threads=threads, stage="coefficients", progress=progress, cancel=cancel)
     coefficients = out.astype(np.float64)
     coefficients[list(base_images)] = np.eye(3)
     return coefficients

@@ -184,15 +184,16 @@ def balance_directions(
     it right wins almost all votes whatever it does elsewhere.
     """
     voters = np.flatnonzero(np.isfinite(bases[0]))
-    if len(voters) == 0:
+    if voters.size == 0:
         return bases
-    voters = rng.permutation(voters)
+    rng.shuffle(voters)
     unit = bases[:, voters] / np.linalg.norm(bases[:, voters], axis=0)
-    cell = np.unique(np.rint(unit * cells).astype(np.int8), axis=1, return_inverse=True)[1].ravel()
+    side = 2 * cells + 1
+    cell = np.ravel_multi_index(tuple(np.rint(unit * cells).astype(int) + cells), (side,) * 3)
     order = np.argsort(cell, kind="stable")
-    counts = np.bincount(cell)
-    rank = np.empty(len(cell), np.int64)
-    rank[order] = np.arange(len(cell)) - np.repeat(np.cumsum(counts) - counts, counts)
+    counts = np.unique_counts(cell).counts
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size) - np.repeat(np.cumsum(counts) - counts, counts)
     keep = voters[rank < max(16, 2 * int(np.median(counts)))]
     balanced = np.full_like(bases, np.nan)
     balanced[:, keep] = bases[:, keep]

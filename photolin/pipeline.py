@@ -148,7 +148,9 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     if options.Ts is None:
         notes.append(f"Ts = {t.Ts:g} suggested: the upper end of the shadows' gray levels")
     if options.base_images is None:
-        notes.append(f"base images {suggestion.starts[0]} chosen: large common lit region, spread lights")
+        notes.append(
+            f"base images {suggestion.starts[0]} chosen: large common lit region, spread lights"
+        )
     return notes
 
 

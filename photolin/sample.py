@@ -22,7 +22,9 @@ class Sample:
     def thin(self, count: int) -> "Sample":
         """About `count` of the pixels, evenly spaced."""
         step = max(1, self.images.shape[1] // count)
-        return Sample(*(np.ascontiguousarray(a) for a in (self.images[:, ::step], self.pixels[::step])))
+        return Sample(
+            *(np.ascontiguousarray(a) for a in (self.images[:, ::step], self.pixels[::step]))
+        )
 
 
 def draw_sample(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> Sample:

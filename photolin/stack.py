@@ -71,10 +71,13 @@ def check_images(images: NDArray, title: str) -> None:
     low, high = images.min(axis=(1, 2)), images.max(axis=(1, 2))
     for k, (a, b) in enumerate(zip(low, high, strict=True)):
         if not (np.isfinite(a) and np.isfinite(b)):
-            raise InputError(f"{title}: image {k} holds NaN or infinity; finite values are accepted")
+            raise InputError(
+                f"{title}: image {k} holds NaN or infinity; finite values are accepted"
+            )
         if a < 0 or b > 1:
             raise InputError(
-                f"{title}: image {k} spans {a:g} to {b:g}; fractions of full scale, 0 to 1, are accepted"
+                f"{title}: image {k} spans {a:g} to {b:g}; "
+                "fractions of full scale, 0 to 1, are accepted"
             )
         if b == 0:
             raise InputError(f"{title}: image {k} is all black; take it out or replace it")
@@ -84,22 +87,27 @@ def check_mask(mask: NDArray, shape: tuple[int, ...], title: str) -> None:
     """Raise InputError unless `mask` is bool of `shape` (H,W) with at least one true pixel."""
     if mask.dtype != np.bool_ or mask.shape != shape:
         raise InputError(
-            f"{title}: the mask is {' x '.join(map(str, mask.shape))} (rows x columns), the images are "
-            f"{' x '.join(map(str, shape))}; a mask of the images' size is accepted"
+            f"{title}: the mask is {' x '.join(map(str, mask.shape))} (rows x columns), the images "
+            f"are {' x '.join(map(str, shape))}; a mask of the images' size is accepted"
         )
     if not mask.any():
-        raise InputError(f"{title}: the mask is empty; mark the object's pixels with non-zero values")
+        raise InputError(
+            f"{title}: the mask is empty; mark the object's pixels with non-zero values"
+        )
 
 
 def check_lights(lights: NDArray, count: int, title: str) -> None:
     """Raise unless `lights` is (count,3), finite, non-zero, with three independent directions."""
     if lights.ndim != 2 or lights.shape != (count, 3):
         raise InputError(
-            f"{title}: {len(lights)} lights for {count} images; one line of x y z for each image is accepted"
+            f"{title}: {len(lights)} lights for {count} images; "
+            "one line of x y z for each image is accepted"
         )
     norms = np.linalg.norm(lights, axis=1, keepdims=True)
     if not np.isfinite(lights).all() or (norms < 1e-9).any():
-        raise InputError(f"{title}: a light is zero or not finite; x y z with a length above 0 is accepted")
+        raise InputError(
+            f"{title}: a light is zero or not finite; x y z with a length above 0 is accepted"
+        )
     if np.linalg.svd(lights / norms, compute_uv=False)[2] < 1e-3 * np.sqrt(count):
         raise DegenerateError(
             f"{title}: the lights lie in one plane (fewer than three independent directions); "

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from .analysis import Cancel, Options
 from .bases import choose_bases
@@ -22,8 +21,10 @@ MIN_TS = 0.003
 """Below this a Ts would tell nothing: 16-bit rounding and grazing light look alike."""
 MIN_T, MAX_T = 0.008, 0.12
 FIRST_T = 0.05
+STEP = 0.0005
 LEVELS = 512
 """Histogram bins over full scale when looking for the shadow level."""
+SMOOTHING = np.array([1, 4, 6, 4, 1]) / 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +70,20 @@ def suggest_thresholds(
         found = provisional(sample, starts, now, options, lights, found, cancel)
         noise = lower_noise(sample.images, found.coefficients, found.bases, now)
         T = float(np.clip(3 * noise, MIN_T, MAX_T))
+    T = round_to_step(T) if options.T is None else T
+    Ts = round_to_step(Ts) if options.Ts is None else Ts
     return Suggestion(
-        Thresholds(round(T, 4), round(Ts, 4)),
+        Thresholds(T, Ts),
         histogram,
         noise,
         tuple(starts),
         None if found is None else found.coefficients,
     )
+
+
+def round_to_step(threshold: float) -> float:
+    """A threshold on the grid that sliders move on, so that what is suggested can be set by hand."""
+    return round(round(threshold / STEP) * STEP, 4)
 
 
 def provisional(
@@ -123,7 +131,7 @@ def dark_histogram(images: NDArray[np.float32]) -> NDArray[np.float64]:
 
 def shadow_level(histogram: NDArray[np.float64]) -> float:
     """Ts from `dark_histogram`; MIN_TS where shadows are exactly dark."""
-    smooth = gaussian_filter1d(histogram, 1, mode="nearest")
+    smooth = np.convolve(np.pad(histogram, 2, mode="edge"), SMOOTHING, mode="valid")
     grays = 1.5 * np.median(smooth[LEVELS // 10 :])
     peak = int(np.argmax(smooth[: LEVELS // 12]))
     if smooth[peak] <= 2 * grays:

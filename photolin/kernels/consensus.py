@@ -128,7 +128,7 @@ def _sample(x, a0, a1, a2, n, state, out):  # pragma: no cover
 def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
     """Best v of n lit observations into `best`; returns its score, or UNFIT.
 
-    `best` holds a first guess, or NaN. `tries` holds the samples needed at each share of D, see `consensus_rows`.
+    `best` holds a first guess, or NaN; `tries` as in `consensus_rows`.
     """
     score, diffuse, misfit = UNFIT, 0, 0.0
     v = np.empty(3, np.float32)
@@ -159,7 +159,9 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def consensus_rows(X, columns, A, T, Ts, tries, limit, seed, out, score, start, stop):  # pragma: no cover
+def consensus_rows(
+    X, columns, A, T, Ts, tries, limit, seed, out, score, start, stop
+):  # pragma: no cover
     """Fit rows start..stop by adaptive sample consensus.
 
     Args:
