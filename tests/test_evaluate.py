@@ -71,14 +71,18 @@ def test_pixels_outside_the_mask_count_for_nothing(truth: Truth) -> None:
     assert e.rms < 1e-6
 
 
-def test_a_constant_error_is_found_as_large_as_it_is(truth: Truth) -> None:
-    labels, coefficients, bases = perfect(truth)
-    lit = np.isin(truth.labels, (Factor.DIFFUSE, Factor.SPECULAR)).sum(0) >= 3
-    assert lit.any()
-    off = replace(truth, ideal=truth.ideal + np.where(lit, 0.01, 5).astype(np.float32))
-    e = evaluate(labels, coefficients, bases, off)
-    assert e.rms == pytest.approx(0.01, rel=1e-4)
-    assert e.p99 == pytest.approx(0.01, rel=1e-3)
+def test_an_error_is_found_as_large_as_it_is_where_three_images_are_lit(truth: Truth) -> None:
+    labels = truth.labels.copy()
+    dim = np.zeros(truth.mask.shape, bool)
+    dim[20:24] = truth.mask[20:24]
+    labels[:, dim] = Factor.CAST
+    labels[:2, dim] = Factor.DIFFUSE  # lit twice: what light there is does not fix three values
+    ramp = np.zeros(truth.mask.shape, np.float32)
+    ramp[truth.mask & ~dim] = np.linspace(0, 0.1, (truth.mask & ~dim).sum())
+    off = replace(truth, labels=labels, ideal=truth.ideal + np.where(dim, 5, ramp))
+    e = evaluate(*perfect(truth), off)
+    assert e.rms == pytest.approx(0.1 / np.sqrt(3), rel=0.01)
+    assert e.p99 == pytest.approx(0.099, rel=1e-3)
 
 
 def test_the_worst_image_is_the_one_with_a_wrong_row(truth: Truth) -> None:

@@ -70,7 +70,7 @@ def write_scene(scene: Scene, folder: str | os.PathLike[str]) -> None:
 
 
 def _fill(scene: Scene, folder: Path) -> None:
-    from imagecodecs import png_encode  # noqa: PLC0415 - not needed to render
+    from imagecodecs import png_encode
 
     stack, truth = scene.stack, scene.truth
     K, H, W = stack.shape
