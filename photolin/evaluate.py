@@ -29,12 +29,14 @@ class Evaluation:
     macro: float
     """Mean of the confusion's diagonal, percent, over the classes the truth has."""
     rms: float
-    """Root mean square of linearized - ideal, fraction of full scale, over mask pixels lit in at
-    least three images; NaN where there are none, as for the two below."""
+    """Root mean square of linearized - ideal, fraction of full scale, over the determined mask
+    pixels that are lit in at least three images; NaN where there are none."""
     p99: float
     """99th percentile of |linearized - ideal| over the same, fraction of full scale."""
     worst_image: int
-    """Number, from 0, of the image with the greatest rms; -1 where no pixel is lit in three."""
+    """Number, from 0, of the image with the greatest rms; -1 where there are no such pixels."""
+    undetermined: int
+    """Mask pixels lit in at least three images whose bases the result leaves open (NaN)."""
     light_error: float
     """Mean angle between true and estimated lights after the best 3x3 map, degrees."""
 
@@ -68,10 +70,11 @@ def evaluate(
     true = truth.labels[:, mask]
     counts, confusion = tabulate(labels[:, mask], true)
     lit = np.isin(true, (Factor.DIFFUSE, Factor.SPECULAR)).sum(0) >= 3
+    bases = linearized_bases[:, mask].astype(np.float64)
+    known = lit & np.isfinite(bases).all(0)
     rms, p99, worst = float("nan"), float("nan"), -1
-    if lit.any():
-        linearized = coefficients @ linearized_bases[:, mask][:, lit].astype(np.float64)
-        error = linearized - truth.ideal[:, mask][:, lit]
+    if known.any():
+        error = coefficients @ bases[:, known] - truth.ideal[:, mask][:, known]
         each = np.square(error).mean(1)
         rms, worst = float(np.sqrt(each.mean())), int(each.argmax())
         p99 = float(np.quantile(np.abs(error), 0.99))
@@ -83,6 +86,7 @@ def evaluate(
         rms=rms,
         p99=p99,
         worst_image=worst,
+        undetermined=int((lit & ~known).sum()),
         light_error=light_error(coefficients, truth.lights),
     )
 
@@ -129,7 +133,7 @@ def format_evaluation(evaluation: Evaluation, title: str = "result") -> str:
             *rows,
             f"macro accuracy      {e.macro:.2f} %",
             f"linearized - ideal  rms {e.rms:.6f}, 99 % below {e.p99:.6f} of full scale, "
-            f"worst in image {e.worst_image}",
+            f"worst in image {e.worst_image}; {e.undetermined} pixels undetermined",
             f"light error         {e.light_error:.3f} degrees",
         ]
     )

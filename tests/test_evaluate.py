@@ -177,6 +177,17 @@ def test_a_scene_without_light_has_no_error_to_speak_of(truth: Truth) -> None:
     assert e.worst_image == -1
 
 
+def test_pixels_a_result_leaves_open_are_counted_and_spoil_no_mean(truth: Truth) -> None:
+    labels, coefficients, bases = perfect(truth)
+    bases = bases.copy()
+    bases[1, 24, 20:23] = np.nan
+    assert truth.mask[24, 20:23].all()
+    e = evaluate(labels, coefficients, bases, truth)
+    assert e.undetermined == 3
+    assert e.rms < 1e-6
+    assert "3 pixels undetermined" in format_evaluation(e)
+
+
 @pytest.mark.parametrize("part", [0, 1, 2])
 def test_a_result_of_another_shape_is_refused_with_both_shapes(truth: Truth, part: int) -> None:
     result = list(perfect(truth))
