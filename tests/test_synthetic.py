@@ -360,6 +360,10 @@ def test_a_write_that_fails_leaves_nothing_behind(
     [
         ({"name": "teapot"}, "no scene 'teapot'; accepted are sphere_cone, cup, pot, sphere_obst"),
         ({"size": (8, 100)}, "size is 8 x 100; accepted are 16 to 4096"),
+        (
+            {"size": (4096, 4096)},
+            "24 images of 4096 x 4096 are too large to render; accepted are 200",
+        ),
         ({"images": 5}, "images is 5; accepted is 6 to 1000"),
         ({"images": 0}, "images is 0; accepted is 6 to 1000"),
         ({"noise": -0.1}, "noise is -0.1; accepted is a fraction"),

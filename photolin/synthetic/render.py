@@ -18,6 +18,9 @@ Bits = Literal[8, 16]
 LIFT = 1e-6
 """Distance a shadow ray starts above its surface, mm: more than rounding, less than any detail."""
 
+VALUE_LIMIT = 200_000_000
+"""Most values of a scene, images times pixels: about 5 GB while it is rendered."""
+
 
 @dataclass(frozen=True, eq=False)
 class Truth:
@@ -105,7 +108,7 @@ def render_scene(
         The stack, clipped to [0, 1] after ambient and noise, and the truth, free of both.
 
     Raises:
-        OptionError: an argument is out of range.
+        OptionError: an argument is out of range, or all together are too large.
     """
     setup = _configure(name, size, images)
     _check_camera(noise, bits, ambient)
@@ -133,7 +136,7 @@ def render_truth(setup: Setup) -> tuple[Truth, Floats]:
     mirrored = 2 * normals[:, 2:] * normals - (0, 0, 1)
 
     labels = np.full((setup.images, H, W), OUTSIDE, np.uint8)
-    ideal, images = np.zeros(labels.shape), np.zeros(labels.shape)
+    ideal, images = np.zeros(labels.shape, np.float32), np.zeros(labels.shape)
     for k, (s, p) in enumerate(zip(lights, power, strict=True)):
         diffuse = seen.albedo * p * (normals @ s)
         specular = seen.gloss * p * np.maximum(mirrored @ s, 0) ** seen.shininess
@@ -148,17 +151,12 @@ def render_truth(setup: Setup) -> tuple[Truth, Floats]:
         ideal[k, seen.mask] = diffuse
         images[k, seen.mask] = (diffuse + specular) * ~(attached | cast)
 
-    def field(values: Floats, outside: float = 0.0) -> NDArray[np.float32]:
-        out = np.full((H, W, *values.shape[1:]), outside, np.float32)
-        out[seen.mask] = values
-        return out
-
     truth = Truth(
         labels=labels,
-        ideal=ideal.astype(np.float32),
-        normals=field(normals),
-        albedo=field(seen.albedo),
-        depth=field(seen.depth, np.nan),
+        ideal=ideal,
+        normals=_picture(normals, seen.mask),
+        albedo=_picture(seen.albedo, seen.mask),
+        depth=_picture(seen.depth, seen.mask, np.nan),
         lights=lights.astype(np.float32),
         power=power.astype(np.float32),
         mask=seen.mask,
@@ -203,6 +201,12 @@ def occluded(
     return blocked
 
 
+def _picture(values: Floats, mask: NDArray[np.bool_], outside: float = 0.0) -> NDArray[np.float32]:
+    picture = np.full((*mask.shape, *values.shape[1:]), outside, np.float32)
+    picture[mask] = values
+    return picture
+
+
 def _configure(name: str, size: tuple[int, int] | None, images: int | None) -> Setup:
     if name not in SCENES:
         raise OptionError(f"there is no scene {name!r}; accepted are {', '.join(SCENES)}")
@@ -213,6 +217,11 @@ def _configure(name: str, size: tuple[int, int] | None, images: int | None) -> S
     count = setup.images if images is None else images
     if not MIN_IMAGES <= count <= 1000:
         raise OptionError(f"images is {count}; accepted is {MIN_IMAGES} to 1000")
+    if H * W * count > VALUE_LIMIT:
+        raise OptionError(
+            f"{count} images of {H} x {W} are too large to render; "
+            f"accepted are {VALUE_LIMIT // 10**6} million values, images times pixels"
+        )
     return replace(setup, size=(H, W), images=count)
 
 
