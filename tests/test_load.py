@@ -123,7 +123,7 @@ def test_a_dark_frame_is_subtracted_and_counted(folder: Path, tmp_path: Path) ->
     below = int((expected < 0).sum())
     assert below >= 1
     assert "dark frame: ambient.png is subtracted" in stack.notes
-    assert f"dark frame: {below} observations lie below it and are taken as 0" in stack.notes
+    assert f"dark frame: observations below it, taken as 0: {below}" in stack.notes
     other = png(tmp_path / "other.png", np.full((H, W, 3), 10, np.uint8))
     replaced = load_stack(folder, LoadOptions(dark=other))
     np.testing.assert_allclose(replaced.images, (STACK.mean(-1) - 10) / 255, atol=1e-6)
@@ -142,7 +142,7 @@ def test_negative_floats_are_counted(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", images)
     stack = load_stack(tmp_path / "a.npy")
     assert stack.images[2, 3, 4] == 0
-    assert "values: 1 observations lie below 0 and are taken as 0" in stack.notes
+    assert "values: observations below 0, taken as 0: 1" in stack.notes
 
 
 def test_a_region_is_cut_from_images_and_mask(folder: Path) -> None:

@@ -51,6 +51,7 @@ def test_masks_truth_and_hidden_files_are_no_images(tmp_path: Path) -> None:
     assert stack.names == tuple(f"{k}.png" for k in range(1, 7))
     np.testing.assert_array_equal(stack.mask, MASK > 0)
     assert "mask: vase.mask.png (6 of 20 pixels)" in stack.notes
+    assert not any(note.startswith("left out") for note in stack.notes)
 
 
 def test_a_word_that_all_names_share_gives_no_role(tmp_path: Path) -> None:
@@ -105,6 +106,7 @@ def test_lights_can_be_ignored_or_replaced(tmp_path: Path) -> None:
     assert ignored.lights is None
     assert "lights: ignored, as asked" in ignored.notes
     replaced = load_stack(tmp_path / "a", LoadOptions(lights=tmp_path / "mine.npy"))
+    assert replaced.lights is not None
     np.testing.assert_array_equal(replaced.lights, LIGHTS)
     with pytest.raises(InputError, match=r"lights\.txt, line 1: 'nonsense'"):
         load_stack(tmp_path / "a")
@@ -140,6 +142,7 @@ def test_diligent_images_are_divided_by_the_power_of_each_channel(tmp_path: Path
     rgb = np.stack([STACK, STACK // 2, STACK // 4], axis=-1) / 65535
     expected = (rgb / powers[:, None, None]).mean(axis=-1)
     np.testing.assert_allclose(stack.images, expected, atol=1e-6)
+    assert stack.lights is not None
     np.testing.assert_allclose(stack.lights, LIGHTS, atol=1e-6)
     np.testing.assert_array_equal(stack.mask, MASK > 0)
     assert stack.names[0] == "l.png"
@@ -189,6 +192,14 @@ def test_compressed_rgb_float_pages_above_1_get_one_scale(tmp_path: Path) -> Non
     assert any(note.startswith("scale: values go up to 6.") for note in stack.notes)
 
 
+def test_previews_in_a_tiff_are_passed_over(tmp_path: Path) -> None:
+    with tifffile.TiffWriter(tmp_path / "a.tif") as tif:
+        for page in STACK[:6]:
+            tif.write(page)
+            tif.write(page[::2, ::2], subfiletype=1)
+    np.testing.assert_array_equal(load_stack(tmp_path / "a.tif").images, fractions(STACK[:6]))
+
+
 def test_a_broken_tiff_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.tif"
     tifffile.imwrite(path, np.tile(STACK, (1, 20, 20)))
@@ -218,6 +229,7 @@ def test_arrays_are_read_with_their_mask_lights_and_names(tmp_path: Path) -> Non
     stack = load_stack(tmp_path / "a.npz")
     np.testing.assert_array_equal(stack.images, fractions())
     np.testing.assert_array_equal(stack.mask, MASK > 0)
+    assert stack.lights is not None
     np.testing.assert_array_equal(stack.lights, LIGHTS)
     assert stack.names == tuple(names)
     np.save(tmp_path / "b.npy", np.asfortranarray(STACK))
@@ -264,7 +276,8 @@ def test_arrays_that_cannot_be_used_are_refused_in_words(tmp_path: Path) -> None
 
 def test_a_huge_array_is_refused_from_its_header(tmp_path: Path) -> None:
     for name, shape, words in (
-        ("a.npy", (6, 50000, 60000), "claims 50000 x 60000 pixels; up to 200 million"),
+        ("a.npy", (6, 50000, 60000), "claims 50000 x 60000 pixels; 1 to 200 million"),
+        ("d.npy", (6, 0, 5), "claims 0 x 5 pixels"),
         ("b.npy", (3000, 1000, 1000), "3000 images of 1000 x 1000 pixels are too many"),
         ("c.npy", (6, 4, 5, 10**12), "is of shape"),
     ):

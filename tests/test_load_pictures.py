@@ -134,7 +134,7 @@ def test_a_jpeg_says_srgb_and_keeps_its_rows_whatever_its_rotation_tag(tmp_path:
 def tagged(pixels: np.ndarray, kind: bytes, content: bytes) -> bytes:
     data = imagecodecs.png_encode(pixels)
     chunk = struct.pack(">I", len(content)) + kind + content
-    return data[:33] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + data[33:]
+    return bytes(data[:33] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + data[33:])
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def png_header(rows: int, columns: int) -> bytes:
 )
 def test_a_huge_claim_is_refused_from_the_header(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
-    with pytest.raises(InputError, match=r"a\.\w+: claims 60000 x 50000 pixels; up to 200 million"):
+    with pytest.raises(InputError, match=r"a\.\w+: claims 60000 x 50000 pixels; 1 to 200 million"):
         read_picture(tmp_path / name)
     assert PIXEL_LIMIT == 200_000_000
 

@@ -142,12 +142,11 @@ def _fit(images: NDArray[np.float32], top: float, plan: Plan) -> list[str]:
     notes = []
     below = int(np.count_nonzero(images < 0))
     if plan.dark is not None:
-        notes.append(f"dark frame: {below} observations lie below it and are taken as 0")
+        notes.append(f"dark frame: observations below it, taken as 0: {below}")
     elif below:
-        notes.append(f"values: {below} observations lie below 0 and are taken as 0")
-    # A sum of weighted channels may pass 1 by rounding; that is no reason to scale.
-    if top > 1 + 1e-5:
+        notes.append(f"values: observations below 0, taken as 0: {below}")
+    if top > 1:
         images /= np.float32(top)
         notes.append(f"scale: values go up to {top:.6g}; all images are divided by that")
-    np.clip(images, 0, 1, out=images)
+    np.maximum(images, 0, out=images)
     return notes

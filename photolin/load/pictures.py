@@ -92,10 +92,10 @@ def as_picture(
 
 
 def check_size(rows: int, columns: int, where: str, count: int = 1) -> None:
-    """Raise InputError for images above PIXEL_LIMIT each or VALUE_LIMIT together."""
-    if rows * columns > PIXEL_LIMIT:
+    """Raise InputError for images without pixels, or above PIXEL_LIMIT or together VALUE_LIMIT."""
+    if not 0 < rows * columns <= PIXEL_LIMIT:
         raise InputError(
-            f"{where}: claims {rows} x {columns} pixels; up to {PIXEL_LIMIT // 10**6} million for "
+            f"{where}: claims {rows} x {columns} pixels; 1 to {PIXEL_LIMIT // 10**6} million for "
             "an image are accepted"
         )
     if count * rows * columns > VALUE_LIMIT:
