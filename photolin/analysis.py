@@ -45,7 +45,8 @@ class Options:
         if not 0 <= self.seed < 2**32:
             raise OptionError(f"seed is {self.seed}; accepted is 0 to 4294967295")
         if self.base_images is not None and (
-            len(set(self.base_images)) != 3 or min(self.base_images) < 0
+            not len(self.base_images) == len(set(self.base_images)) == 3
+            or min(self.base_images) < 0
         ):
             raise OptionError(
                 f"base_images is {self.base_images}; "

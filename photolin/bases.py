@@ -18,6 +18,8 @@ from .sample import Sample
 MAX_TRIPLES = 3000
 """All triples of up to 27 images; a random choice of more."""
 PIXELS = 800
+MIN_COMMON = 10
+"""Pixels that must be lit in all three, or all of a smaller object's."""
 CHUNK = 256
 
 
@@ -40,8 +42,9 @@ def choose_bases(
     score = score_triples(sample.thin(PIXELS).images, triples, Ts, lights)
     if not score.max() > 0:
         raise DegenerateError(
-            f"no three images are lit at the same pixels (i >= Ts = {Ts:g}); "
-            "lower Ts, or use images with larger common lit regions"
+            f"no three images that are lit at the same pixels (i >= Ts = {Ts:g}) differ enough to "
+            "tell surface directions apart; lower Ts, or use images with larger common lit "
+            "regions, lights farther apart and an object that is not flat"
         )
     chosen: list[tuple[int, int, int]] = []
     for index in np.argsort(-score, kind="stable"):
@@ -67,7 +70,7 @@ def score_triples(
     lights: NDArray[np.float64] | None,
 ) -> NDArray[np.float64]:
     """(n,) share of pixels lit in all three, times how far from a plane the lights lie, 0 to 1."""
-    lit = (images >= Ts) & (images > 0)
+    lit: NDArray[np.bool_] = (images >= Ts) & (images > 0)
     # highlights would pass for independence
     tops = 3 * np.ma.median(np.ma.masked_array(images, ~lit), axis=1, keepdims=True).filled(0)
     values = np.where(lit, np.minimum(images, tops), 0)
@@ -78,7 +81,8 @@ def score_triples(
         v = values[chunk] * common[:, None]
         s = v if lights is None else lights[chunk]
         spread = gram_determinants(s @ s.transpose(0, 2, 1))
-        scores.append(np.where(common.sum(axis=1) < 10, 0, common.mean(axis=1) * np.sqrt(spread)))
+        enough = common.sum(axis=1) >= min(MIN_COMMON, common.shape[1])
+        scores.append(np.where(enough, common.mean(axis=1) * np.sqrt(spread), 0))
     return np.concatenate(scores)
 
 

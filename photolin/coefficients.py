@@ -80,4 +80,7 @@ def draw_samples(
     rows = A[:, triples].transpose(1, 2, 0).astype(np.float64)
     norms = np.prod(np.linalg.norm(rows, axis=2), axis=1)
     regular = np.abs(np.linalg.det(rows)) > SINGULAR * norms
-    return triples[regular], np.linalg.inv(rows[regular]).astype(np.float32)
+    inverses = np.linalg.inv(rows[regular])
+    # factors of 1e-38 and less have an inverse beyond single precision
+    usable = np.abs(inverses).max(axis=(1, 2), initial=0) < np.finfo(np.float32).max
+    return triples[regular][usable], inverses[usable].astype(np.float32)

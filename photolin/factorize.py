@@ -66,6 +66,13 @@ def search_coefficients(
         DegenerateError: no start led anywhere.
         Cancelled: `cancel` said so.
     """
+    lit = (sample.images >= thresholds.Ts) & (sample.images > 0)
+    dark = np.flatnonzero(lit.sum(axis=1) < 3)
+    if dark.size:
+        raise DegenerateError(
+            f"image {dark[0]} is lit in fewer than three of the object's pixels (i >= Ts = "
+            f"{thresholds.Ts:g}), which tells nothing of its light; take it out or lower Ts"
+        )
     few = sample.thin(ROUGH_PIXELS)
     found = []
     for triple in starts:
@@ -107,7 +114,7 @@ def start_coefficients(
 ) -> NDArray[np.float64] | None:
     """(K,3) coefficients of Eq. (2) with raw base images, from pixels lit in all three."""
     bases = sample.images[list(triple)].copy()
-    bases[:, (bases < thresholds.Ts).any(axis=0)] = np.nan
+    bases[:, ((bases < thresholds.Ts) | (bases <= 0)).any(axis=0)] = np.nan
     T = min(max(3 * thresholds.T, 0.1), MAX_T)
     return fit_coefficients(sample, bases, T, thresholds.Ts, seed, limit)
 
@@ -183,11 +190,12 @@ def balance_directions(
     A plane that fills most of the picture is one direction; without this, a candidate that maps
     it right wins almost all votes whatever it does elsewhere.
     """
-    voters = np.flatnonzero(np.isfinite(bases[0]))
+    length = np.linalg.norm(bases, axis=0)
+    voters = np.flatnonzero(length > 0)
     if voters.size == 0:
         return bases
     rng.shuffle(voters)
-    unit = bases[:, voters] / np.linalg.norm(bases[:, voters], axis=0)
+    unit = bases[:, voters] / length[voters]
     side = 2 * cells + 1
     cell = np.ravel_multi_index(tuple(np.rint(unit * cells).astype(int) + cells), (side,) * 3)
     order = np.argsort(cell, kind="stable")
