@@ -32,27 +32,26 @@ def analyze(
         stack: the input; its lights, where known, take the place of step 1.
         options: method, thresholds, base images, samples and seed.
         threads: processors to use, all when left out; the result does not depend on it.
-        progress: told the stage and the fraction of it that is done.
+        progress: told the stage and the fraction of it that is done, from 0 to 1 in each.
         cancel: asked between blocks of work.
 
     Raises:
-        OptionError: base images that the stack does not have.
+        OptionError: base images that the stack does not have, or fewer than one thread.
         DegenerateError: the images do not determine a solution.
         Cancelled: `cancel` returned true.
     """
     options = options or Options()
     check_base_images(options, stack)
-    tell = progress or (lambda stage, fraction: None)
+    if threads is not None and threads < 1:
+        raise OptionError(f"threads is {threads}; accepted is 1 or more")
     seconds: dict[str, float] = {}
 
-    with timed(seconds, "thresholds"):
-        tell("thresholds", 0.0)
+    with timed("thresholds", seconds, progress):
         sample = draw_sample(stack, options.seed)
         suggestion = suggest_thresholds(sample, options, stack.lights, cancel)
     thresholds, base_images = suggestion.thresholds, suggestion.starts[0]
 
-    with timed(seconds, "coefficients"):
-        tell("coefficients", 0.0)
+    with timed("coefficients", seconds, progress):
         if stack.lights is not None:
             coefficients = stack.lights
         elif options.method == "robust":
@@ -63,12 +62,12 @@ def analyze(
             )
         coefficients = relate_to_bases(coefficients, base_images)
 
-    with timed(seconds, "linearize"):
+    with timed("linearize", seconds, progress):
         bases = linearize(
             stack, coefficients, base_images, thresholds, options, threads, progress, cancel
         )
 
-    with timed(seconds, "classify"):
+    with timed("classify", seconds, progress):
         labels = label_images(
             stack.images, bases, coefficients, stack.mask, thresholds, threads=threads
         )
@@ -92,11 +91,14 @@ def analyze(
 
 
 @contextmanager
-def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Book the wall-clock time of the block under `stage`."""
+def timed(stage: str, seconds: dict[str, float], progress: Progress | None) -> Iterator[None]:
+    """Book the wall-clock time of the block under `stage`; tell of its start and its end."""
+    tell = progress or (lambda stage, fraction: None)
+    tell(stage, 0.0)
     start = perf_counter()
     yield
     seconds[stage] = perf_counter() - start
+    tell(stage, 1.0)
 
 
 def check_base_images(options: Options, stack: ImageStack) -> None:
