@@ -17,7 +17,15 @@ from typing import Literal
 from tyro.conf import Positional
 
 from .analysis import METHODS, Analysis, Options, Progress
-from .console import complain, parse, progress_bar, run_summary, stack_summary, thresholds
+from .console import (
+    complain,
+    parse,
+    progress_bar,
+    run_summary,
+    stack_summary,
+    stop_at_ctrl_c,
+    thresholds,
+)
 from .errors import InputError, OutputError
 from .evaluate import Evaluation, format_evaluation
 from .evaluate import evaluate as measure
@@ -35,6 +43,7 @@ from .export import (
 )
 from .load import LoadOptions, load_stack
 from .paper import compare_with_paper
+from .pipeline import analyze
 from .stack import ImageStack
 from .synthetic import Truth, load_truth, render_scene, write_scene
 
@@ -90,14 +99,12 @@ def run(
         out: Folder for the result; made when missing, an earlier result in it is replaced.
         threads: Processors to use; all when left out. The result does not depend on it.
     """
-    from .pipeline import analyze
-
     check_output(out)
     if stack.resolve() in (out.resolve(), (out / "result.npz").resolve()):
         raise OutputError(f"{out}: holds the input; another folder is accepted")
-    with progress_bar() as progress:
+    with progress_bar() as progress, stop_at_ctrl_c() as cancel:
         images, seconds = _load(stack, reading, progress)
-        result = analyze(images, analysis, threads=threads, progress=progress)
+        result = analyze(images, analysis, threads=threads, progress=progress, cancel=cancel)
     result = replace(result, seconds={"load": seconds, **result.seconds})
     save_result(result, out, command=COMMAND.get(), stack_path=stack, load_options=reading)
     print(run_summary(result))
@@ -126,14 +133,14 @@ def inspect(
         port: Port to listen on, 1 to 65535.
         no_browser: Print the address and do not open a browser.
     """
-    from webapp.app import serve
-
     result = load_result(path) if is_result(path) else None
     with progress_bar() as progress:
         if result is None:
             images, _ = _load(path, reading, progress)
         else:
             images = load_result_stack(path, stack)
+    from webapp.app import serve
+
     options = result.options if result else analysis
     serve(images, result, options=options, host=host, port=port, open_browser=not no_browser)
 
@@ -187,8 +194,6 @@ def evaluate(
         seed: Seed for a stack.
         threads: Processors to use; all when left out.
     """
-    from .pipeline import analyze
-
     if is_result(path):
         if truth is None:
             raise InputError(f"{path}: is a result; name its ground truth (gt.npz) after it")
@@ -197,10 +202,12 @@ def evaluate(
         print(format_evaluation(_measure(result, load_truth(truth)), title))
         return
     answer = load_truth(path if truth is None else truth)
-    with progress_bar() as progress:
+    with progress_bar() as progress, stop_at_ctrl_c() as cancel:
         images, _ = _load(path, reading, progress)
         each = [Options(method, T, Ts, seed=seed) for method in METHODS]
-        results = [analyze(images, o, threads=threads, progress=progress) for o in each]
+        results = [
+            analyze(images, o, threads=threads, progress=progress, cancel=cancel) for o in each
+        ]
     for result in results:
         print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
     print(compare_with_paper({r.options.method: _measure(r, answer) for r in results}))

@@ -3,13 +3,16 @@
 import io
 import os
 import re
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 
 import tyro
+from tqdm import tqdm
 
-from .analysis import Analysis, Progress
+from .analysis import Analysis, Cancel, Progress
 from .errors import OptionError, PhotolinError
 from .factors import OUTSIDE, TITLES
 from .stack import ImageStack
@@ -65,13 +68,14 @@ def complain(error: BaseException) -> int:
 
 def _unbox(box: str) -> str:
     """The sentence in tyro's error box, without frame, colours, nested help and type names."""
-    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line)[2:-2] for line in box.splitlines()[1:-1]]
     body: list[str] = []
-    for line in lines:
-        if re.fullmatch(r"[─-]{3,}", line.strip()) or line.startswith("Got errors"):
+    for framed in box.splitlines()[1:-1]:
+        line = re.sub(r"\x1b\[[0-9;]*m", "", framed)[2:].rstrip(" │|")
+        rule = re.fullmatch(r"[─-]{3,}", line.strip())
+        if body and (rule or line.startswith("Got errors")):
             break
-        if not line.startswith(" " * 8):
-            body.append(line.strip())
+        if not rule and not line.startswith(" " * 8):
+            body.append(line)
     sentence = " ".join(" ".join(body).split()).rstrip(".")
     value = re.fullmatch(
         r"Error parsing (\S+): no type matching (.+) could be instantiated from \[(.+)\]", sentence
@@ -83,10 +87,24 @@ def _unbox(box: str) -> str:
 
 
 @contextmanager
+def stop_at_ctrl_c() -> Iterator[Cancel]:
+    """Let Ctrl-C also stop the threads of a pool, which would else finish what is queued."""
+    stop = threading.Event()
+
+    def interrupt(*_: object) -> None:
+        stop.set()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield stop.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def progress_bar() -> Iterator[Progress]:
     """A bar on stderr while that is a terminal, nothing otherwise."""
-    from tqdm import tqdm
-
     layout = "{desc:<14} {percentage:3.0f}% |{bar}| {elapsed}"
     with tqdm(total=100, disable=None, leave=False, bar_format=layout) as bar:
 

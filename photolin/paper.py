@@ -44,9 +44,8 @@ def compare_with_paper(evaluations: Mapping[Method, Evaluation]) -> str:
     for method, evaluation in evaluations.items():
         published = PUBLISHED.get(method)
         heads = "".join(f"{LETTERS[factor]:>8}" for factor in COLUMNS)
-        lines.append(
-            f"{method:16}{heads}{'   | paper' + heads[8:32] if published else ''}".rstrip()
-        )
+        beside = f"   | {heads[:32]}  in the paper" if published else ""
+        lines.append(f"{method:16}{heads}{beside}")
         for k, letter in enumerate(rows):
             beside = f"   | {_cells(np.array(published[k]))}" if published else ""
             lines.append(f"{letter:>16}{_cells(evaluation.confusion[k])}{beside}")

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
+import tifffile
 from numpy.typing import NDArray
+from PIL import Image
 
 from ..analysis import Analysis
 from ..errors import OptionError, OutputError
@@ -26,8 +28,6 @@ def label_png(labels: NDArray[np.uint8]) -> bytes:
     Args:
         labels: (H,W) Factor codes; OUTSIDE (255) becomes transparent.
     """
-    from PIL import Image
-
     palette = np.zeros((256, 3), np.uint8)
     for factor, colour in PALETTE.items():
         palette[factor] = colour
@@ -38,8 +38,6 @@ def label_png(labels: NDArray[np.uint8]) -> bytes:
 
 def mask_png(labels: NDArray[np.uint8], factor: Factor) -> bytes:
     """Encode where (H,W) `labels` equals `factor` as a gray PNG of 0 and 255."""
-    from PIL import Image
-
     return _png(Image.fromarray(np.where(labels == factor, np.uint8(255), np.uint8(0))))
 
 
@@ -50,8 +48,6 @@ def linearized_tiff(analysis: Analysis, images: Sequence[int]) -> bytes:
         analysis: what to take them from.
         images: image numbers from 0, one page each; the page's description names it.
     """
-    import tifffile
-
     buffer = io.BytesIO()
     H, W = analysis.mask.shape
     with tifffile.TiffWriter(buffer, bigtiff=len(images) * H * W * 4 > 4e9) as tiff:
@@ -134,7 +130,7 @@ def write_file(path: Path, data: bytes) -> None:
             partial.unlink()
 
 
-def _png(image, **options: int) -> bytes:
+def _png(image: Image.Image, **options: int) -> bytes:
     buffer = io.BytesIO()
     image.save(buffer, "PNG", **options)
     return buffer.getvalue()

@@ -186,6 +186,8 @@ def is_result(path: str | Path) -> bool:
 
 def _result_file(path: str | Path) -> Path:
     path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: does not exist; a folder that photolin run wrote is accepted")
     return path / RESULT if path.is_dir() else path
 
 
