@@ -29,6 +29,8 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
   let fitted = null; // pose that fit() chose, to stay fitted when the window changes
   let peeking = false; // space bar held: without overlay
 
+  const hasPicture = () => Boolean(viewer.nodeRefFromName[planes[0]] && viewer.cameraControl);
+  const placed = () => size !== null && hasPicture();
   const focalLength = () => canvas.clientHeight / 2 / Math.tan((camera.fov * Math.PI) / 360);
   const distanceAt = (scale) => (focalLength() * worldPixel) / scale;
   const fitScale = () =>
@@ -57,6 +59,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     controls.setTarget(target.x, target.y, target.z, false);
     controls.minAzimuthAngle = controls.maxAzimuthAngle = controls.azimuthAngle;
     controls.minPolarAngle = controls.maxPolarAngle = controls.polarAngle;
+    controls.update(1e-3); // moves the camera now, not with the next frame
     size = [canvas.clientWidth, canvas.clientHeight];
     viewer.requestRender();
   }
@@ -109,7 +112,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
   // --- before each frame ---
 
   function beforeRender() {
-    if (!viewer.nodeRefFromName[planes[0]] || !viewer.cameraControl) return;
+    if (!hasPicture()) return;
     if (size === null) configure();
     else followSize();
     planes.forEach((name, order) =>
@@ -145,6 +148,16 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
   layer.style.cssText = "position:absolute;inset:0;overflow:hidden;pointer-events:none";
   canvas.parentElement.append(layer);
   const grid = layer.appendChild(document.createElement("div"));
+  const readout = layer.appendChild(document.createElement("div"));
+  readout.style.cssText =
+    "position:absolute;left:0;bottom:0;padding:.3em .8em;border-radius:0 6px 0 0;white-space:pre;" +
+    "font:13px ui-monospace,monospace;color:#fff;background:rgba(0,0,0,.72)";
+  readout.hidden = true;
+
+  function setReadout(text) {
+    readout.textContent = text;
+    readout.hidden = text === "";
+  }
   const marks = []; // {element, row, column}
   const RING =
     "position:absolute;box-sizing:border-box;border:2px solid #fff;" +
@@ -200,7 +213,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
   }
 
   function pixelUnder(event) {
-    if (size === null) return "";
+    if (!placed()) return "";
     const box = canvas.getBoundingClientRect();
     const { scale, left, top } = similarity();
     const row = Math.floor((event.clientY - box.top + 0.5 - top) / scale);
@@ -231,7 +244,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     const action = local[event.key.toLowerCase()];
     if (action) {
       event.preventDefault();
-      if (!event.repeat && size !== null) action();
+      if (!event.repeat && placed()) action();
     } else if (event.key.length === 1 || event.key.startsWith("Arrow") || event.key === "Escape") {
       send(keyId, `${++keysSent} ${event.key}`); // numbered: the same key again is a new value
     }
@@ -239,7 +252,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
 
   listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
   listen(canvas, "pointerleave", () => hover(""));
-  listen(canvas, "dblclick", () => size !== null && fit());
+  listen(canvas, "dblclick", () => placed() && fit());
   listen(window, "keydown", onKey, true);
   listen(window, "keyup", (event) => event.key === " " && peeking && peek(false), true);
   listen(window, "blur", () => peeking && peek(false));
@@ -268,7 +281,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
   // "Reset View" and changes of the world's orientation end here.
   Object.defineProperty(viewer, "resetCameraPose", {
     configurable: true,
-    get: () => () => size !== null && fit(),
+    get: () => () => placed() && fit(),
     set: () => {},
   });
   scene.onBeforeRender = beforeRender;
@@ -281,5 +294,12 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     scene.onBeforeRender = () => {};
   }
 
-  window.photolin = { fit, oneToOne, setMarks, similarity, close };
+  window.photolin = {
+    fit: () => placed() && fit(),
+    oneToOne: () => placed() && oneToOne(),
+    similarity: () => (placed() ? similarity() : null),
+    setMarks,
+    setReadout,
+    close,
+  };
 };

@@ -36,6 +36,7 @@ class Canvas:
         self._shape = (height, width)
         self._marker: Pixel | None = None
         self._pins: tuple[tuple[int, int, str], ...] = ()
+        self._readout = ""
         self._base, self._overlay = (
             client.scene.add_image(
                 name,
@@ -81,6 +82,12 @@ class Canvas:
         """Put short texts at pixels, (row, column, text) each, in place of the earlier ones."""
         self._pins = tuple(pins)
         self._send_marks()
+
+    def set_readout(self, text: str) -> None:
+        """Write one line in the lower left corner; an empty text removes it."""
+        if text != self._readout:
+            self._readout = text
+            call_javascript(self._client, "window.photolin.setReadout", text)
 
     def fit(self) -> None:
         """Show the whole picture, centred in the free part of the window."""

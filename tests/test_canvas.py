@@ -1,0 +1,278 @@
+"""The 2D canvas: what a click means, and what a person sees, in a real browser."""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from browser import (
+    camera_rotation,
+    click_pixel,
+    colours_on_screen,
+    encode_png,
+    open_canvas,
+    place_of,
+    similarity,
+    wait_for_colours,
+    wait_until,
+)
+
+from webapp.access import Server, open_server
+from webapp.canvas import WORLD_HEIGHT, Canvas, pixel_in_text, pixel_on_ray
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (60, 80), (2048, 3072)])
+def test_a_ray_through_the_centre_of_a_pixel_finds_that_pixel(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(3)
+    rows, columns = rng.integers(0, shape[0], 50), rng.integers(0, shape[1], 50)
+    origin = np.array([1.5, -2.0, -7.0])
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        side = WORLD_HEIGHT / shape[0]
+        target = [(column + 0.5 - shape[1] / 2) * side, (row + 0.5 - shape[0] / 2) * side, 0]
+        assert pixel_on_ray(origin, np.array(target) - origin, shape) == (row, column)
+
+
+@pytest.mark.parametrize(
+    ("origin", "direction"),
+    [
+        ((0, 5.001, -9), (0, 0, 1)),
+        ((-5.001, 0, -9), (0, 0, 1)),
+        ((0, 0, -9), (1, 0, 0)),
+        ((0, 0, -9), (0, 0, 0)),
+        ((float("nan"), 0, -9), (0, 0, 1)),
+        ((0, 0, 1e300), (1e300, 0, 1e-300)),
+    ],
+)
+def test_a_ray_beside_the_picture_finds_nothing(origin: Any, direction: Any) -> None:
+    assert pixel_on_ray(origin, direction, (10, 10)) is None
+
+
+@pytest.mark.parametrize("text", ["", "1", "-1,2", "60,0", "0,80", "1,2,3", "nan,1", "9" * 4000])
+def test_a_text_that_names_no_pixel_is_none(text: str) -> None:
+    assert pixel_in_text(text, (60, 80)) is None
+    assert pixel_in_text("59,79", (60, 80)) == (59, 79)
+
+
+def test_the_script_of_the_canvas_is_part_of_the_package() -> None:
+    assert "window.openCanvas" in resources.files("webapp").joinpath("canvas.js").read_text("utf-8")
+
+
+# --- in a real browser ---
+
+
+@dataclass
+class Stage:
+    """A server whose clients get a canvas of one picture, and what the last client reported."""
+
+    server: Server
+    picture: np.ndarray
+    canvas: Any = None
+    slider: Any = None
+    picks: list[tuple[int, int]] = field(default_factory=list)
+    hovers: list[tuple[int, int] | None] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+    connected: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+
+    def connect(self, client: viser.ClientHandle) -> None:
+        self.canvas = Canvas(client, *self.picture.shape[:2])
+        self.canvas.set_base(encode_png(self.picture), "png")
+        self.canvas.on_pick(self.picks.append)
+        self.canvas.on_hover(self.hovers.append)
+        self.canvas.on_key(self.keys.append)
+        self.slider = client.gui.add_slider("T", 0.0, 1.0, 0.01, 0.5)
+        client.gui.add_text("Note", "")
+        self.connected.release()
+
+
+@pytest.fixture
+def open_stage(page: Any) -> Iterator[Callable[[int, int], Stage]]:
+    """Open a page with a canvas of coloured noise, (H, W, 3)."""
+    servers: list[Server] = []
+
+    def open_one(height: int, width: int) -> Stage:
+        server = open_server(port=0)
+        servers.append(server)
+        server.server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.server.gui.main_panel.dock_right()
+        noise = np.random.default_rng(1).integers(0, 256, (height, width, 3), dtype=np.uint8)
+        stage = Stage(server, noise)
+        server.server.on_client_connect(stage.connect)
+        open_canvas(page, server.url)
+        assert stage.connected.acquire(timeout=10)
+        return stage
+
+    yield open_one
+    for server in servers:
+        server.stop()
+
+
+OpenStage = Callable[[int, int], Stage]
+
+
+@pytest.mark.browser
+def test_clicks_on_the_fitted_picture_land_on_their_pixel(page: Any, open_stage: OpenStage) -> None:
+    stage = open_stage(60, 80)
+    scale, left, top = similarity(page)
+    width = page.evaluate("window.__viserMutable.canvas.clientWidth")
+    assert left == pytest.approx(width - left - 80 * scale, abs=0.01)
+    assert top == pytest.approx(900 - top - 60 * scale, abs=0.01)
+    assert 0 < left < 0.02 * width
+    expected = [(0, 0), (0, 79), (59, 0), (59, 79), (17, 33)]
+    page.mouse.click(left + 5, top - 8)
+    page.wait_for_timeout(100)
+    for count, pixel in enumerate(expected, 1):
+        click_pixel(page, *pixel)
+        wait_until(lambda count=count: len(stage.picks) == count)
+    assert stage.picks == expected
+
+
+@pytest.mark.browser
+def test_clicks_at_20_fold_land_on_their_pixel_up_to_its_edges(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(400, 400)
+    expected = [(0, 0), (0, 399), (399, 0), (399, 399)]
+    for row, column in expected:
+        page.keyboard.press("f")
+        page.mouse.move(*place_of(page, row + 0.5, column + 0.5))
+        for _ in range(7):
+            page.mouse.wheel(0, -600)
+        wait_until(lambda: similarity(page)[0] >= 20)
+        for at in (0.06, 0.85):  # 0.94 of the last row lies below the window
+            count = len(stage.picks)
+            page.mouse.click(*place_of(page, row + at, column + at))
+            wait_until(lambda count=count: len(stage.picks) > count)
+    assert stage.picks == [pixel for pixel in expected for _ in range(2)]
+
+
+@pytest.mark.browser
+def test_the_pointer_pans_zooms_and_never_rotates(page: Any, open_stage: OpenStage) -> None:
+    open_stage(60, 80)
+    rotation = camera_rotation(page)
+    scale, left, top = similarity(page)
+    page.mouse.move(500, 400)
+    page.mouse.down()
+    page.mouse.move(560, 430, steps=4)
+    page.mouse.move(620, 375, steps=4)
+    page.mouse.up()
+    assert similarity(page) == pytest.approx((scale, left + 120, top - 25), abs=0.5)
+
+    before = [(300 - similarity(page)[1]) / scale, (200 - similarity(page)[2]) / scale]
+    page.mouse.move(300, 200)
+    for _ in range(4):
+        page.mouse.wheel(0, -400)
+    wait_until(lambda: similarity(page)[0] > 1.3 * scale)
+    zoomed, left, top = similarity(page)
+    assert [(300 - left) / zoomed, (200 - top) / zoomed] == pytest.approx(before, abs=1 / scale)
+    assert camera_rotation(page) == pytest.approx(rotation, abs=1e-9)
+
+    page.mouse.dblclick(500, 400)
+    wait_until(lambda: similarity(page)[0] == pytest.approx(scale))
+
+
+@pytest.mark.browser
+def test_keys_on_a_slider_or_the_page_move_no_camera(page: Any, open_stage: OpenStage) -> None:
+    stage = open_stage(60, 80)
+    view, rotation = similarity(page), camera_rotation(page)
+    page.get_by_role("slider").first.focus()
+    for key in ("ArrowUp", "ArrowLeft", "ArrowRight", "ArrowRight"):
+        page.keyboard.press(key, delay=60)
+    wait_until(lambda: stage.slider.value == pytest.approx(0.52))
+    assert stage.keys == []
+    page.evaluate("document.activeElement.blur()")
+    keys = ["w", "a", "s", "d", "q", "e", "ArrowLeft", "ArrowUp"]
+    for key in keys:
+        page.keyboard.press(key, delay=60)
+    wait_until(lambda: len(stage.keys) == len(keys))
+    assert stage.keys == keys
+    assert similarity(page) == pytest.approx(view, abs=1e-6)
+    assert camera_rotation(page) == pytest.approx(rotation, abs=1e-9)
+
+
+@pytest.mark.browser
+def test_pixels_are_square_and_their_colours_exact(page: Any, open_stage: OpenStage) -> None:
+    stage = open_stage(60, 80)
+    wait_for_colours(page, stage.picture)
+    for at in (0.12, 0.88):  # linear interpolation would mix neighbours there
+        shown = colours_on_screen(page, (60, 80), at)
+        assert np.array_equal(shown[:, :79], stage.picture[:, :79])  # the panel shades the last
+
+    overlay = np.random.default_rng(2).integers(0, 256, (60, 80, 4), dtype=np.uint8)
+    overlay[..., 3] = np.where(overlay[..., 3] < 80, 0, 140)
+    alpha = overlay[..., 3:] / 255
+    blended = np.rint(alpha * overlay[..., :3] + (1 - alpha) * stage.picture)
+    stage.canvas.set_overlay(encode_png(overlay))
+    wait_for_colours(page, blended, tolerance=1)
+    page.keyboard.down(" ")
+    wait_for_colours(page, stage.picture)
+    page.keyboard.up(" ")
+    wait_for_colours(page, blended, tolerance=1)
+
+    stage.canvas.set_base(encode_png(stage.picture[::-1]), "png")
+    stage.canvas.set_overlay(None)
+    wait_for_colours(page, stage.picture[::-1])
+    shown = colours_on_screen(page, (60, 80), 0.88)
+    assert np.array_equal(shown[:, :79], stage.picture[::-1, :79])
+
+
+@pytest.mark.browser
+def test_one_to_one_shows_pixel_for_pixel_and_fit_follows_the_window(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(301, 400)
+    fitted = similarity(page)[0]
+    stage.canvas.one_to_one()
+    wait_until(lambda: similarity(page)[0] == pytest.approx(1))
+    wait_for_colours(page, stage.picture)
+    page.set_viewport_size({"width": 1280, "height": 720})
+    page.wait_for_function("window.__viserMutable.canvas.clientHeight === 720")
+    assert similarity(page)[0] == pytest.approx(1)
+    stage.canvas.fit()
+    width = page.evaluate("window.__viserMutable.canvas.clientWidth")
+    smaller = 0.98 * min(720 / 301, width / 400)
+    wait_until(lambda: similarity(page)[0] == pytest.approx(smaller))
+    page.set_viewport_size({"width": 1440, "height": 900})
+    wait_until(lambda: similarity(page)[0] == pytest.approx(fitted))
+
+
+@pytest.mark.browser
+def test_the_page_reports_the_pointer_and_marks_pixels(page: Any, open_stage: OpenStage) -> None:
+    stage = open_stage(60, 80)
+    page.mouse.move(*place_of(page, 12.5, 34.5))
+    wait_until(lambda: stage.hovers[-1:] == [(12, 34)])
+    page.mouse.move(*place_of(page, -0.5, 3))
+    wait_until(lambda: stage.hovers[-1] is None)
+
+    page.get_by_role("textbox").last.click()
+    page.keyboard.type("fgw ")
+    stage.canvas.set_marker((59, 0))
+    stage.canvas.set_pins([(2, 3, "<b>1")])
+    page.wait_for_selector(".photolin-pin")
+    assert page.inner_text(".photolin-pin") == "<b>1"
+    box = page.wait_for_selector(".photolin-marker").bounding_box()
+    assert (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2) == pytest.approx(
+        place_of(page, 59.5, 0.5), abs=0.6
+    )
+    stage.canvas.set_marker(None)
+    page.wait_for_selector(".photolin-marker", state="detached")
+    assert stage.keys == []
+
+
+@pytest.mark.browser
+def test_a_tab_that_lost_its_connection_gets_a_working_canvas_again(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(60, 80)
+    stage.server.server._websock_server.disconnect_all_clients()
+    assert stage.connected.acquire(timeout=10)
+    wait_for_colours(page, stage.picture)
+    click_pixel(page, 5, 70)
+    wait_until(lambda: stage.picks == [(5, 70)])
+    page.keyboard.press("]")
+    wait_until(lambda: stage.keys == ["]"])
