@@ -6,12 +6,14 @@ included. A message that none of our own widgets could have sent is dropped here
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
 import viser
 
 from . import viser_internals
+
+Option = TypeVar("Option", bound=str)
 
 MAX_TEXT = 4096
 """Characters of a text field."""
@@ -107,7 +109,9 @@ def accepted_value(handle: Any, value: object) -> Any | None:
 
 def clamp_number(value: object, low: float, high: float, fallback: float) -> float:
     """`value` as a float in [low, high]; `fallback` when it is not a finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return fallback
+    if isinstance(value, float) and not math.isfinite(value):
         return fallback
     return float(min(max(value, low), high))
 
@@ -117,9 +121,9 @@ def clamp_integer(value: object, low: int, high: int, fallback: int) -> int:
     return round(clamp_number(value, low, high, fallback))
 
 
-def choose_option(value: object, options: Sequence[str], fallback: str) -> str:
+def choose_option(value: object, options: Sequence[Option], fallback: Option) -> Option:
     """`value` when it is one of `options`, else `fallback`."""
-    return value if isinstance(value, str) and value in options else fallback
+    return next((option for option in options if option == value), fallback)
 
 
 def _is_finite(message: object) -> bool:
