@@ -70,14 +70,15 @@ def score_triples(
     lights: NDArray[np.float64] | None,
 ) -> NDArray[np.float64]:
     """(n,) share of pixels lit in all three, times how far from a plane the lights lie, 0 to 1."""
-    lit: NDArray[np.bool_] = (images >= Ts) & (images > 0)
+    lit = np.logical_and(images >= Ts, images > 0)
     # highlights would pass for independence
     tops = 3 * np.ma.median(np.ma.masked_array(images, ~lit), axis=1, keepdims=True).filled(0)
     values = np.where(lit, np.minimum(images, tops), 0)
     scores = []
     for start in range(0, len(triples), CHUNK):
         chunk = triples[start : start + CHUNK]
-        common = lit[chunk].all(axis=1)
+        common = np.all(lit[chunk], axis=1)
+        count = np.count_nonzero(common, axis=1)
         v = values[chunk] * common[:, None]
         s = v if lights is None else lights[chunk]
         spread = gram_determinants(s @ s.transpose(0, 2, 1))
@@ -90,4 +91,5 @@ def gram_determinants(gram: NDArray[np.floating]) -> NDArray[np.float64]:
     """(n,) determinants of (n,3,3) Gram matrices of vectors scaled to length 1, 0 to 1."""
     gram = gram.astype(np.float64)
     scale = np.prod(np.diagonal(gram, axis1=1, axis2=2), axis=1)
-    return np.maximum(np.linalg.det(gram), 0) / np.maximum(scale, np.finfo(np.float64).tiny)
+    tiny = np.finfo(np.float64).tiny
+    return np.asarray(np.maximum(np.linalg.det(gram), 0) / np.maximum(scale, tiny), np.float64)

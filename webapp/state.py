@@ -21,6 +21,8 @@ class ViewState:
     """The picture under the overlay; labels: the label map alone, opaque."""
     method: Method = "robust"
     """Whose result is shown."""
+    beside: Method | None = None
+    """Whose result is plotted beside it for the selected pixel (Fig. 9)."""
     T: float = 0.05
     """Relative tolerance of i = l, unitless, in (0, 1]."""
     Ts: float = 0.02
@@ -44,6 +46,8 @@ class ViewState:
             raise OptionError(f"layer is {self.layer!r}; accepted are {', '.join(LAYERS)}")
         if self.method not in METHODS:
             raise OptionError(f"method is {self.method!r}; accepted are {', '.join(METHODS)}")
+        if self.beside is not None and self.beside not in METHODS:
+            raise OptionError(f"beside is {self.beside!r}; accepted are {', '.join(METHODS)}")
         if not 0 <= self.opacity <= 1:
             raise OptionError(f"opacity is {self.opacity:g}; accepted is 0 to 1")
         if self.gain is not None and not 0 < self.gain < float("inf"):

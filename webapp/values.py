@@ -22,7 +22,7 @@ MAX_TEXT = 4096
 _Vector = tuple[float, float, float]
 
 
-class _Sent(msgspec.Struct, tag_field="type", tag=True, forbid_unknown_fields=True):
+class _Sent(msgspec.Struct, tag_field="type", tag=True):
     """Named and shaped as in viser."""
 
 

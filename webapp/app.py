@@ -1,0 +1,82 @@
+"""The web tool: one server, one session for each tab."""
+
+import webbrowser
+from threading import Lock
+
+import viser
+
+from photolin.analysis import Analysis, Options
+from photolin.stack import ImageStack
+
+from .access import Server, open_server
+from .runs import Runs
+from .session import Session
+
+
+class App:
+    """Serves one stack; attaches a session to each tab and detaches it."""
+
+    def __init__(
+        self,
+        stack: ImageStack,
+        result: Analysis | None = None,
+        *,
+        options: Options | None = None,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+    ) -> None:
+        """Start serving; `result` is shown at once, otherwise the first tab computes by `options`.
+
+        Raises:
+            OptionError: the host or port cannot be used.
+        """
+        self._runs = Runs(stack, options or Options(), result)
+        self._sessions: dict[int, Session] = {}
+        self._lock = Lock()
+        self.server: Server = open_server(host, port)
+        self.server.server.on_client_connect(self._attach)
+        self.server.server.on_client_disconnect(self._detach)
+
+    def stop(self) -> None:
+        """Close all tabs and free the port."""
+        with self._lock:
+            sessions = list(self._sessions.values())
+            self._sessions.clear()
+        for session in sessions:
+            session.close()
+        self.server.stop()
+
+    def _attach(self, client: viser.ClientHandle) -> None:
+        session = Session(client, self._runs)
+        with self._lock:
+            self._sessions[client.client_id] = session
+
+    def _detach(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            session = self._sessions.pop(client.client_id, None)
+        if session is not None:
+            session.close()
+
+
+def serve(
+    stack: ImageStack,
+    result: Analysis | None,
+    *,
+    options: Options,
+    host: str,
+    port: int,
+    open_browser: bool,
+) -> None:
+    """Serve until Ctrl-C; opens the browser or prints the address.
+
+    Raises:
+        OptionError: the host or port cannot be used.
+    """
+    app = App(stack, result, options=options, host=host, port=port)
+    print(f"photolin: {stack.title} at {app.server.url} (Ctrl-C ends it)", flush=True)
+    try:
+        if open_browser:
+            webbrowser.open(app.server.url)
+        app.server.server.sleep_forever()
+    finally:
+        app.stop()

@@ -1,0 +1,53 @@
+"""Files for the browser to save: what is on screen, by the thresholds on screen. Pure."""
+
+from dataclasses import replace
+
+from photolin.analysis import Analysis
+from photolin.errors import OptionError
+from photolin.export import export_files, result_npz, zip_files
+from photolin.factors import Thresholds
+from photolin.label import label_images
+from photolin.stack import ImageStack
+
+
+def relabel(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> Analysis:
+    """The analysis with labels by `thresholds`; a note says what its bases were computed with."""
+    if thresholds == analysis.thresholds:
+        return analysis
+    used = analysis.thresholds
+    labels = label_images(
+        stack.images,
+        analysis.linearized_bases,
+        analysis.coefficients,
+        analysis.mask,
+        thresholds,
+    )
+    note = (
+        f"labels by T {thresholds.T:g}, Ts {thresholds.Ts:g}; bases by T {used.T:g}, Ts {used.Ts:g}"
+    )
+    return replace(analysis, labels=labels, thresholds=thresholds, notes=(*analysis.notes, note))
+
+
+def make_download(analysis: Analysis, kind: str, image: int | None) -> tuple[str, bytes]:
+    """Name and bytes of one download.
+
+    Args:
+        analysis: labelled by the thresholds on screen.
+        kind: masks, labels, linearized or result.
+        image: image number from 0; None for all (result always holds all).
+
+    Raises:
+        OptionError: no such kind.
+    """
+    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in analysis.title)
+    which = "all" if image is None else f"{image:03d}"
+    images = None if image is None else [image]
+    match kind:
+        case "result":
+            return f"{stem}_result.npz", result_npz(analysis)
+        case "linearized":
+            (data,) = export_files(analysis, "linearized", images).values()
+            return f"{stem}_{which}_linearized.tif", data
+        case "masks" | "labels":
+            return f"{stem}_{which}_{kind}.zip", zip_files(export_files(analysis, kind, images))
+    raise OptionError(f"export is {kind!r}; accepted are masks, labels, linearized and result")

@@ -1,0 +1,71 @@
+"""What one view shows, computed once for all panels. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photolin.analysis import Analysis, Method
+from photolin.factors import Thresholds, classify
+from photolin.label import label_images
+from photolin.stack import ImageStack
+
+from .state import ViewState
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One image of one result at the thresholds of one view."""
+
+    stack: ImageStack
+    state: ViewState
+    analysis: Analysis | None
+    """Result of the method shown; None while there is none."""
+    beside: Analysis | None
+    """Result of the method compared with; None where none is wanted or there yet."""
+    labels: NDArray[np.uint8] | None
+    """(H,W) of the image shown, by the view's thresholds."""
+
+
+@dataclass(frozen=True, eq=False)
+class PixelValues:
+    """One pixel in all images."""
+
+    i: NDArray[np.float32]
+    """(K,) input, fraction of full scale."""
+    l: NDArray[np.float32]  # noqa: E741
+    """(K,) linearized, signed."""
+    labels: NDArray[np.uint8]
+    """(K,) Factor codes."""
+
+
+def compose(stack: ImageStack, results: Mapping[Method, Analysis], state: ViewState) -> Frame:
+    """The frame of a view."""
+    analysis = results.get(state.method)
+    labels = None
+    if analysis is not None:
+        k = state.image
+        one = slice(k, k + 1)
+        labels = label_images(
+            stack.images[one],
+            analysis.linearized_bases,
+            analysis.coefficients[one],
+            stack.mask,
+            state.thresholds,
+        )[0]
+    beside = results.get(state.beside) if state.beside is not None else None
+    return Frame(stack, state, analysis, beside, labels)
+
+
+def pixel_values(
+    stack: ImageStack, analysis: Analysis, pixel: tuple[int, int], thresholds: Thresholds
+) -> PixelValues:
+    """Input, linearized value and label of pixel (row, column) in all K images."""
+    row, column = pixel
+    i = stack.images[:, row, column]
+    c = analysis.coefficients.astype(np.float32)
+    b = analysis.linearized_bases[:, row, column]
+    # in the order and precision of the label loop, so that both always agree
+    l = c[:, 0] * b[0] + c[:, 1] * b[1] + c[:, 2] * b[2]  # noqa: E741
+    return PixelValues(i, l, classify(i, l, thresholds))

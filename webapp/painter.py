@@ -1,0 +1,103 @@
+"""Draws frames on the canvas, each part only when it differs from what is there."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .canvas import Canvas, Pixel
+from .frame import Frame
+from .readout import status_line
+from .render import (
+    choose_scale,
+    encode_jpeg,
+    encode_labels,
+    encode_png,
+    render_input,
+    render_linearized,
+    render_residual,
+)
+
+LARGE = 400_000
+"""Pixels above which a picture is first sent as JPEG, and without loss once nothing changes."""
+
+
+class Painter:
+    """Picture, overlay, marker and readout of one tab."""
+
+    def __init__(self, canvas: Canvas) -> None:
+        self._canvas = canvas
+        self._drawn: dict[str, object] = {}
+        self._caption = ""
+
+    def paint(self, frame: Frame, pointer: Pixel | None, *, rested: bool) -> bool:
+        """Show a frame.
+
+        Args:
+            pointer: (row, column) under the pointer, whose values the readout says.
+            rested: nothing has changed for a while: send the picture without loss.
+
+        Returns:
+            Whether the picture on screen is still a lossy one.
+        """
+        state = frame.state
+        look = (state.image, state.layer, state.gain, id(frame.analysis))
+        exact = frame.stack.mask.size <= LARGE or rested
+        if self._is_new("picture", *look) or (exact and self._drawn.get("exact") != look):
+            picture, self._caption = render_layer(frame)
+            if exact:
+                self._canvas.set_base(encode_png(picture), "png")
+                self._drawn["exact"] = look
+            else:
+                self._canvas.set_base(encode_jpeg(picture), "jpeg")
+        self._paint_overlay(frame)
+        if self._is_new("marker", state.pixel):
+            self._canvas.set_marker(state.pixel)
+        self._canvas.set_readout(self._caption if pointer is None else describe(frame, pointer))
+        return self._drawn.get("exact") != look
+
+    def _paint_overlay(self, frame: Frame) -> None:
+        state = frame.state
+        solid = state.layer == "labels"
+        look = (state.shown, state.opacity, state.outlines, solid)
+        if not self._is_new("overlay", state.image, state.thresholds, id(frame.analysis), look):
+            return
+        overlay = None
+        if frame.labels is not None:
+            overlay = encode_labels(
+                frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
+            )
+        self._canvas.set_overlay(overlay)
+
+    def _is_new(self, part: str, *key: object) -> bool:
+        if self._drawn.get(part) == key:
+            return False
+        self._drawn[part] = key
+        return True
+
+
+def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
+    """The picture under the overlay, (H,W) or (H,W,3), and what its greys or colours mean."""
+    state, stack = frame.state, frame.stack
+    if frame.analysis is None or state.layer in ("input", "labels"):
+        gain = state.gain or 1.0
+        shown = "" if gain == 1 else f", shown {gain:g} times brighter"
+        return render_input(stack.images[state.image], gain), f"{state.layer}{shown}"
+    signed = frame.analysis.linearized(state.image)
+    if state.layer == "linearized":
+        scale = choose_scale(signed, stack.mask)
+        text = f"linearized, black -{scale:.3f} to white +{scale:.3f} of full scale, zero mid-grey"
+        return render_linearized(signed, scale), text
+    residual = np.where(stack.mask, stack.images[state.image] - signed, np.float32(0))
+    scale = choose_scale(residual, stack.mask)
+    text = f"residual, blue -{scale:.3f} to red +{scale:.3f} of full scale, zero white"
+    return render_residual(residual, scale), text
+
+
+def describe(frame: Frame, pixel: Pixel) -> str:
+    """The values of a pixel (row, column) in the image shown, in one line."""
+    row, column = pixel
+    k = frame.state.image
+    i = float(frame.stack.images[k, row, column])
+    if frame.analysis is None or frame.labels is None:
+        return f"row {row}  column {column}  i {i:.3f}"
+    l = float(frame.analysis.coefficients[k] @ frame.analysis.linearized_bases[:, row, column])  # noqa: E741
+    return status_line(row, column, i, l, int(frame.labels[row, column]))

@@ -1,0 +1,242 @@
+"""One browser tab.
+
+Widgets and the canvas only report that something changed. One worker thread re-reads them all,
+makes a new ViewState and draws what differs; changes that arrive meanwhile make one more round, so
+the last value always wins and nothing is drawn twice. Long work runs in a thread of its own and
+reports through the same worker.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from threading import Event, Thread
+from typing import Literal
+
+import viser
+
+from photolin.analysis import Analysis, Method
+from photolin.errors import Cancelled, OptionError, PhotolinError
+from photolin.factors import LETTERS, Thresholds
+
+from .canvas import Canvas, Pixel
+from .downloads import make_download, relabel
+from .frame import compose
+from .job import Job
+from .painter import Painter
+from .runs import Runs
+from .state import ViewState
+from .views.export import ExportView
+from .views.help import HelpView
+from .views.legend import LegendView
+from .views.picture import PictureView
+from .views.pixel import PixelView
+from .views.run import RunView
+from .views.shares import SharesView
+from .views.summary import SummaryView
+from .views.thresholds import ThresholdView
+
+REST = 0.3
+"""Seconds without a change after which a rough picture is drawn again without loss."""
+FIRST = Thresholds(0.05, 0.02)
+"""Where the sliders stand until thresholds are given or suggested."""
+
+
+class Session:
+    """The widgets, the state and the worker of one tab."""
+
+    def __init__(self, client: viser.ClientHandle, runs: Runs) -> None:
+        """Build the tab and start to work for it."""
+        self._client, self._runs, self._stack = client, runs, runs.stack
+        self._results: dict[Method, Analysis] = {}
+        self._declined: set[Method] = set()
+        """Methods that were cancelled or failed; not tried again unasked."""
+        self._shown_results: dict[Method, Analysis] | None = None
+        self._pixel: Pixel | None = None
+        self._pointer: Pixel | None = None
+        thresholds = FIRST
+        if runs.result is not None:
+            self._results[runs.result.options.method] = runs.result
+            thresholds = runs.result.thresholds
+        self._state = ViewState(method=runs.options.method, T=thresholds.T, Ts=thresholds.Ts)
+        self._wake, self._closed = Event(), Event()
+        self._job = Job(self._guarded)
+        self._build(client)
+        self._wake.set()
+        Thread(target=self._work, name="tab", daemon=True).start()
+
+    def close(self) -> None:
+        """Stop all work for the tab."""
+        self._closed.set()
+        self._job.stop()
+        self._wake.set()
+
+    def _build(self, client: viser.ClientHandle) -> None:
+        _, H, W = self._stack.shape
+        gui, changed = client.gui, self._wake.set
+        gui.configure_theme(
+            control_width="large", show_logo=False, show_share_button=False, dark_mode=True
+        )
+        gui.main_panel.dock_right()
+        self._canvas = canvas = Canvas(client, H, W)
+        self._painter = Painter(canvas)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
+            self._picture = PictureView(gui, self._stack, changed, canvas.fit, canvas.one_to_one)
+            self._run = RunView(gui, self._state.method, changed, self._job.stop)
+            self._thresholds = ThresholdView(
+                gui, self._state.thresholds, changed, self._suggest, self._linearize_again
+            )
+            self._shares = SharesView(gui)
+            self._pixel_view = PixelView(gui, changed)
+            self._legend = LegendView(gui, self._stack, changed)
+            self._summary = SummaryView(gui)
+        with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
+            self._export = ExportView(gui, self._download)
+        with tabs.add_tab("Help", viser.Icon.HELP):
+            HelpView(gui)
+        both = (self._picture, self._thresholds, self._pixel_view)
+        self._readers = (*both, self._run, self._legend)
+        self._drawers = (*both, self._shares, self._summary)
+        self._keys = self._bind_keys()
+        canvas.on_pick(self._pick)
+        canvas.on_hover(self._point)
+        canvas.on_key(self._press)
+
+    # --- what the user does ---
+
+    def _bind_keys(self) -> dict[str, Callable[[], object]]:
+        classes: dict[str, Callable[[], object]] = {
+            number: partial(self._legend.toggle, factor)
+            for number, factor in zip("12345", LETTERS, strict=True)
+        }
+        return classes | {
+            "arrowleft": partial(self._picture.step, -1),
+            "arrowright": partial(self._picture.step, 1),
+            "arrowup": partial(self._picture.turn, -1),
+            "arrowdown": partial(self._picture.turn, 1),
+            "[": partial(self._thresholds.nudge, T=-1),
+            "]": partial(self._thresholds.nudge, T=1),
+            "{": partial(self._thresholds.nudge, Ts=-1),
+            "}": partial(self._thresholds.nudge, Ts=1),
+            "m": self._run.turn,
+            "r": self._linearize_again,
+            "s": self._suggest,
+            "e": lambda: self._download(*self._export.chosen()),
+            "escape": self._job.stop,
+        }
+
+    def _press(self, key: str) -> None:
+        if (action := self._keys.get(key.lower())) is not None:
+            action()
+
+    def _pick(self, pixel: Pixel) -> None:
+        self._pixel = pixel
+        self._wake.set()
+
+    def _point(self, pixel: Pixel | None) -> None:
+        self._pointer = pixel
+        self._wake.set()
+
+    def _suggest(self) -> None:
+        self._job.start(self._set_suggested)
+
+    def _linearize_again(self) -> None:
+        state = self._state
+        self._job.start(partial(self._linearize, state.method, state.thresholds))
+
+    def _download(self, kind: str, everything: bool) -> None:
+        self._job.start(partial(self._send, kind, everything))
+
+    # --- long work ---
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        self._run.busy(True)
+        try:
+            work()
+        except Cancelled as error:
+            self._notify("Cancelled", str(error), "gray")
+        except PhotolinError as error:
+            self._notify("This did not work", str(error), "red")
+        except Exception as error:
+            self._report(error)
+        finally:
+            self._run.busy(False)
+            self._wake.set()
+
+    def _linearize(self, method: Method, thresholds: Thresholds | None) -> None:
+        """Analyze by `method`; when None, with the thresholds asked for at first."""
+        options = replace(self._runs.options, method=method)
+        if thresholds is not None:
+            options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
+        self._declined.add(method)
+        result = self._runs.run(options, self._run.progress, self._job.stopping)
+        self._declined.discard(method)
+        untouched = not self._results and self._state.thresholds == FIRST
+        self._results = {**self._results, method: result}
+        if untouched:
+            self._thresholds.set(result.thresholds)
+
+    def _set_suggested(self) -> None:
+        self._run.progress("finding thresholds", 0.5)
+        self._thresholds.set(self._runs.suggest())
+
+    def _send(self, kind: str, everything: bool) -> None:
+        state = self._state
+        analysis = self._results.get(state.method)
+        if analysis is None:
+            raise OptionError("there is no result to export yet; linearize first")
+        self._run.progress("writing files", 0.5)
+        shown = relabel(self._stack, analysis, state.thresholds)
+        name, data = make_download(shown, kind, None if everything else state.image)
+        self._client.send_file_download(name, data, save_immediately=True)
+        size = f"{len(data) / 1e6:.2f} MB"
+        self._notify("Saved", f"{name}, {size}, in the browser's downloads", "green")
+
+    # --- drawing ---
+
+    def _work(self) -> None:
+        rough = False
+        while not self._closed.is_set():
+            rested = not self._wake.wait(REST if rough else None)
+            self._wake.clear()
+            try:
+                rough = self._round(rested)
+            except Exception as error:
+                rough = False
+                self._report(error)
+
+    def _round(self, rested: bool) -> bool:
+        """Read all widgets and draw what differs; true when the picture is still rough."""
+        before, state = self._state, self._state
+        for view in self._readers:
+            state = view.read(state)
+        self._state = state = replace(state, pixel=self._pixel)
+        results = self._results
+        self._ensure_results(state, results)
+        frame = compose(self._stack, results, state)
+        rough = self._painter.paint(frame, self._pointer, rested=rested)
+        if state != before or results is not self._shown_results:
+            self._shown_results = results
+            for view in self._drawers:
+                view.draw(frame)
+        return rough
+
+    def _ensure_results(self, state: ViewState, results: dict[Method, Analysis]) -> None:
+        """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
+        thresholds = state.thresholds if results else None
+        for method in (state.method, state.beside):
+            if method is not None and method not in (*results, *self._declined):
+                self._job.start(partial(self._linearize, method, thresholds))
+
+    # --- telling ---
+
+    def _notify(self, title: str, body: str, color: Literal["red", "green", "gray"]) -> None:
+        if not self._closed.is_set():
+            seconds = None if color == "red" else 6
+            self._client.add_notification(title, body, auto_close_seconds=seconds, color=color)
+
+    def _report(self, error: Exception) -> None:
+        """A fault of the program: a short note on screen, the trace in the terminal."""
+        traceback.print_exception(error)
+        self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")

@@ -1,0 +1,36 @@
+"""How to use the tool, on one page."""
+
+import viser
+
+TEXT = """
+Every pixel of every image is labelled **D** diffuse, **S** specular, **A** attached shadow
+(the surface faces away from the light), **C** cast shadow (something blocks the light) or **U**
+undefined. Move **T** and **Ts** until the labels look right, click pixels to see why they are what
+they are, then linearize again and export.
+
+| key | does |
+|---|---|
+| ← → | previous, next image |
+| ↑ ↓ | view: input, linearized, residual, labels |
+| [ ] | T down, up |
+| { } | Ts down, up |
+| S | suggest T and Ts |
+| R | linearize again with T and Ts |
+| M | next method |
+| 1 … 5 | show or hide D, S, A, C, U |
+| space held | without overlay |
+| F, G | fit, one image pixel on one screen pixel |
+| E | export as chosen |
+| Esc | cancel what is running |
+
+Left-drag moves the picture, the wheel zooms at the pointer, a double click fits.
+Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in
+space x is right, y up, z to the camera.
+"""
+
+
+class HelpView:
+    """The text."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        gui.add_markdown(TEXT)

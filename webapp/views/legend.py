@@ -1,0 +1,63 @@
+"""The classes: switches, opacity, outlines; brightness of the picture."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import viser
+
+from photolin.factors import LETTERS, TITLES, Factor
+from photolin.stack import ImageStack
+
+from ..render import choose_gain
+from ..state import ViewState
+from ..values import clamp_number
+
+MIN_GAIN, MAX_GAIN = 0.5, 20.0
+
+
+class LegendView:
+    """One switch a class, and how overlay and picture are drawn."""
+
+    def __init__(self, gui: viser.GuiApi, stack: ImageStack, changed: Callable[[], None]) -> None:
+        self._first_gain = round(min(choose_gain(stack.images, stack.mask), MAX_GAIN), 1)
+        self._switches = {
+            factor: gui.add_checkbox(
+                f"{letter} {TITLES[factor]}",
+                True,
+                hint=f"Show {TITLES[factor]} (key: {number})",
+            )
+            for number, (factor, letter) in enumerate(LETTERS.items(), 1)
+        }
+        self._opacity = gui.add_slider(
+            "Opacity", 0.0, 1.0, 0.05, 0.55, hint="Of the overlay; diffuse is drawn fainter"
+        )
+        self._outlines = gui.add_checkbox(
+            "outlines", False, hint="Draw the borders of the classes instead of their areas"
+        )
+        self._gain = gui.add_slider(
+            "Brightness",
+            MIN_GAIN,
+            MAX_GAIN,
+            0.1,
+            self._first_gain,
+            hint="Factor for showing the input; stored values are not changed",
+        )
+        for handle in (*self._switches.values(), self._opacity, self._outlines, self._gain):
+
+            @handle.on_update
+            async def _(_: viser.GuiEvent) -> None:
+                changed()
+
+    def toggle(self, factor: Factor) -> None:
+        """Show or hide a class."""
+        self._switches[factor].value = not self._switches[factor].value
+
+    def read(self, state: ViewState) -> ViewState:
+        """The state with switches, opacity, outlines and gain as set here."""
+        return replace(
+            state,
+            shown=frozenset(f for f, handle in self._switches.items() if handle.value is True),
+            opacity=clamp_number(self._opacity.value, 0, 1, 0.55),
+            outlines=self._outlines.value is True,
+            gain=clamp_number(self._gain.value, MIN_GAIN, MAX_GAIN, self._first_gain),
+        )

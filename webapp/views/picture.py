@@ -1,0 +1,93 @@
+"""Which image, and which layer of it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import viser
+
+from photolin.stack import ImageStack
+
+from ..frame import Frame
+from ..readout import escape
+from ..state import LAYERS, ViewState
+from ..values import choose_option, clamp_integer
+
+PREVIOUS, NEXT, FIT, ONE_TO_ONE = "◀ previous", "next ▶", "fit", "1:1"
+
+
+class PictureView:
+    """Image slider with its buttons, and the layer."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        stack: ImageStack,
+        changed: Callable[[], None],
+        fit: Callable[[], None],
+        one_to_one: Callable[[], None],
+    ) -> None:
+        self._count = len(stack.images)
+        self._name = gui.add_html("")
+        self._image = gui.add_slider(
+            "Image",
+            0,
+            self._count - 1,
+            1,
+            0,
+            hint="Image number, from 0 (keys: left and right arrow)",
+        )
+        self._buttons = gui.add_button_group(" ", (PREVIOUS, NEXT, FIT, ONE_TO_ONE))
+        self._layer = gui.add_dropdown(
+            "View",
+            LAYERS,
+            initial_value="input",
+            hint="input: as photographed. linearized: diffuse reflection alone, signed, zero is "
+            "mid-grey. residual: input minus linearized, zero is white. labels: the label map "
+            "alone (keys: up and down arrow)",
+        )
+        for handle in (self._image, self._layer):
+
+            @handle.on_update
+            async def _(_: viser.GuiEvent) -> None:
+                changed()
+
+        actions = {
+            PREVIOUS: lambda: self.step(-1),
+            NEXT: lambda: self.step(1),
+            FIT: fit,
+            ONE_TO_ONE: one_to_one,
+        }
+
+        @self._buttons.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            actions[self._buttons.value]()
+
+    def step(self, by: int) -> None:
+        """Go `by` images on, round the ends."""
+        self._image.value = (self._read_image() + by) % self._count
+
+    def turn(self, by: int) -> None:
+        """Go `by` layers on, round the ends."""
+        at = LAYERS.index(choose_option(self._layer.value, LAYERS, "input"))
+        self._layer.value = LAYERS[(at + by) % len(LAYERS)]
+
+    def read(self, state: ViewState) -> ViewState:
+        """The state with image and layer as set here."""
+        return replace(
+            state,
+            image=self._read_image(),
+            layer=choose_option(self._layer.value, LAYERS, "input"),
+        )
+
+    def draw(self, frame: Frame) -> None:
+        """Name what is shown."""
+        K, H, W = frame.stack.shape
+        file = frame.stack.names[frame.state.image]
+        self._name.content = (
+            f'<div style="padding:0 1em;font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
+            f"&nbsp;{K} images, {H} rows × {W} columns &nbsp;<b>{escape(Path(file).name)}</b></div>"
+        )
+
+    def _read_image(self) -> int:
+        return clamp_integer(self._image.value, 0, self._count - 1, 0)

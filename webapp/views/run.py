@@ -1,0 +1,63 @@
+"""Which method, and how far a run has come."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import viser
+
+from photolin.analysis import METHODS, Method
+
+from ..readout import escape
+from ..state import ViewState
+from ..values import choose_option
+
+
+class RunView:
+    """Method switch, progress and cancel."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        method: Method,
+        changed: Callable[[], None],
+        cancel: Callable[[], None],
+    ) -> None:
+        self._fallback = method
+        self._method = gui.add_dropdown(
+            "Method",
+            METHODS,
+            initial_value=method,
+            hint="robust: photolin's own. classification: the 2007 paper to the letter. "
+            "statistical: its predecessor (key: M)",
+        )
+        self._stage = gui.add_html("", visible=False)
+        self._bar = gui.add_progress_bar(0, visible=False, animated=True)
+        self._cancel = gui.add_button("Cancel", visible=False, icon=viser.Icon.X)
+
+        @self._method.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            changed()
+
+        @self._cancel.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            cancel()
+
+    def turn(self) -> None:
+        """Go to the next method."""
+        at = METHODS.index(choose_option(self._method.value, METHODS, self._fallback))
+        self._method.value = METHODS[(at + 1) % len(METHODS)]
+
+    def busy(self, running: bool) -> None:
+        """Show or hide the progress bar and Cancel."""
+        for handle in (self._stage, self._bar, self._cancel):
+            handle.visible = running
+        self._bar.value = 0
+
+    def progress(self, stage: str, fraction: float) -> None:
+        """Show how far a run has come."""
+        self._stage.content = f'<div style="padding:0 1em;font-size:0.8em">{escape(stage)}</div>'
+        self._bar.value = round(100 * min(max(fraction, 0), 1))
+
+    def read(self, state: ViewState) -> ViewState:
+        """The state with the method as set here."""
+        return replace(state, method=choose_option(self._method.value, METHODS, self._fallback))

@@ -1,0 +1,100 @@
+"""T and Ts, and whether the linearized bases belong to them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import viser
+
+from photolin.factors import Thresholds
+
+from ..frame import Frame
+from ..readout import escape, threshold_status
+from ..state import ViewState
+from ..values import clamp_number
+
+STEP = 0.0005
+RANGES = {"T": (0.0005, 0.2), "Ts": (0.0, 0.2)}
+KEY_FACTOR = 1.1
+SUGGEST, LINEARIZE = "suggest T, Ts", "linearize again"
+
+
+class ThresholdView:
+    """The two sliders that everything follows."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        initial: Thresholds,
+        changed: Callable[[], None],
+        suggest: Callable[[], None],
+        linearize: Callable[[], None],
+    ) -> None:
+        self._fallback = initial
+        self._T = gui.add_slider(
+            "T",
+            *RANGES["T"],
+            STEP,
+            initial.T,
+            hint="Relative tolerance: an observation i counts as diffuse while |i - l| is at most "
+            "T times i (keys: [ and ])",
+        )
+        self._Ts = gui.add_slider(
+            "Ts",
+            *RANGES["Ts"],
+            STEP,
+            initial.Ts,
+            hint="Shadow level, fraction of full scale: darker observations are shadow "
+            "(keys: { and })",
+        )
+        self._status = gui.add_html("")
+        self._buttons = gui.add_button_group(
+            " ",
+            (SUGGEST, LINEARIZE),
+            hint="suggest: T from the noise below the fit, Ts from the dark end of the histogram "
+            "(key: S). linearize again: T and Ts enter the linearization itself; until then only "
+            "the labels follow the sliders (key: R)",
+        )
+        for handle in (self._T, self._Ts):
+
+            @handle.on_update
+            async def _(_: viser.GuiEvent) -> None:
+                changed()
+
+        actions = {SUGGEST: suggest, LINEARIZE: linearize}
+
+        @self._buttons.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            actions[self._buttons.value]()
+
+    def set(self, thresholds: Thresholds) -> None:
+        """Move both sliders."""
+        self._T.value, self._Ts.value = thresholds.T, thresholds.Ts
+
+    def nudge(self, T: int = 0, Ts: int = 0) -> None:
+        """Move a slider by a tenth of its value, at least one step, `T` or `Ts` times."""
+        for handle, times, (low, high) in (
+            (self._T, T, RANGES["T"]),
+            (self._Ts, Ts, RANGES["Ts"]),
+        ):
+            if times:
+                steps = max(1, round(handle.value * (KEY_FACTOR - 1) / STEP))
+                value = round(handle.value / STEP) * STEP + times * steps * STEP
+                handle.value = round(min(max(value, low), high), 4)
+
+    def read(self, state: ViewState) -> ViewState:
+        """The state with T and Ts as set here."""
+        return replace(
+            state,
+            T=clamp_number(self._T.value, *RANGES["T"], self._fallback.T),
+            Ts=clamp_number(self._Ts.value, *RANGES["Ts"], self._fallback.Ts),
+        )
+
+    def draw(self, frame: Frame) -> None:
+        """Say what the labels and what the bases were computed with."""
+        used = None if frame.analysis is None else frame.analysis.thresholds
+        shown = frame.state.thresholds
+        colour = "inherit" if used in (None, shown) else "#D55E00"
+        self._status.content = (
+            f'<div style="padding:0 1em;font-size:0.8em;color:{colour}">'
+            f"{escape(threshold_status(shown, used))}</div>"
+        )
