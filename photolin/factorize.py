@@ -112,10 +112,19 @@ def start_coefficients(
     seed: int,
     limit: int,
 ) -> NDArray[np.float64] | None:
-    """(K,3) coefficients of Eq. (2) with raw base images, from pixels lit in all three."""
+    """(K,3) coefficients of Eq. (2) with raw base images, from pixels lit in all three.
+
+    None where they are not determined: no image fits, or the base images differ in fewer than
+    three ways by more than a tenth of T, which noise alone could do.
+    """
     bases = sample.images[list(triple)].copy()
-    bases[:, ((bases < thresholds.Ts) | (bases <= 0)).any(axis=0)] = np.nan
+    lit = ((bases >= thresholds.Ts) & (bases > 0)).all(axis=0)
+    unit = bases[:, lit] / np.linalg.norm(bases[:, lit], axis=0)
+    spread = np.linalg.svd(unit, compute_uv=False)[-1] if lit.sum() >= 3 else 0
     T = min(max(3 * thresholds.T, 0.1), MAX_T)
+    if spread <= min(thresholds.T, MAX_T / 3) / 10 * np.sqrt(lit.sum()):
+        return None
+    bases[:, ~lit] = np.nan
     return fit_coefficients(sample, bases, T, thresholds.Ts, seed, limit)
 
 
@@ -131,8 +140,14 @@ def fit_coefficients(
     """(K,3) coefficients from bases (3,M), NaN in pixels without a say; None if not determined."""
     K = len(sample.images)
     voters = balance_directions(bases, np.random.default_rng(seed))
-    c, _ = fit_rows(sample.pixels, np.arange(K), voters, T, Ts, limit=limit, seed=seed, guess=guess)
-    c = c.astype(np.float64)
+    frame = np.linalg.qr(voters[:, np.isfinite(voters[0])].T.astype(np.float64))[1]
+    if len(frame) < 3 or np.linalg.cond(frame) > 1e4:
+        return None
+    # where lights or surface directions differ little, only an orthogonal frame tells them apart
+    white = np.linalg.solve(frame.T, voters)
+    start = None if guess is None else guess @ frame.T
+    c, _ = fit_rows(sample.pixels, np.arange(K), white, T, Ts, limit=limit, seed=seed, guess=start)
+    c = np.linalg.solve(frame, c.T.astype(np.float64)).T
     if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
         return None
     return c
