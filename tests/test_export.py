@@ -132,7 +132,10 @@ def test_the_report_counts_labels_and_support_inside_the_mask(
         assert image["support"] == pytest.approx(good / P)  # Eq. (5), by hand
     mean = np.mean([image["support"] for image in report["images"]])
     assert report["support"]["mean"] == pytest.approx(mean)  # Eq. (6) sums the same table
-    assert report["support"]["p05"] <= report["support"]["p50"] <= report["support"]["p95"]
+    share = np.isin(analysis.labels, (1, 3, 4)).mean(axis=0)[analysis.mask]
+    for q in (5, 25, 50, 75, 95):
+        assert report["support"][f"p{q:02d}"] == pytest.approx(np.percentile(share, q))
+    assert report["support"]["pixels"] == P
     assert report["command"] == "photolin run a out"
     assert report["seed"] == 9
     assert report["warnings"] == ["image 3 is dim"]
@@ -233,6 +236,15 @@ def test_an_interrupted_write_leaves_the_old_file_and_no_other(
         write_file(target, b"new and longer")
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_reader_of_the_old_file_never_sees_a_mix(tmp_path: Path) -> None:
+    target = tmp_path / "result.npz"
+    target.write_bytes(b"old")
+    with target.open("rb", buffering=0) as reader:
+        write_file(target, b"new and longer")
+        assert reader.read() == b"old"
+    assert target.read_bytes() == b"new and longer"
 
 
 def test_an_output_that_is_a_file_is_refused(analysis: Analysis, tmp_path: Path) -> None:
