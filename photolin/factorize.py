@@ -147,7 +147,7 @@ def fit_coefficients(
     white = np.linalg.solve(frame.T, voters)
     start = None if guess is None else guess @ frame.T
     c, _ = fit_rows(sample.pixels, np.arange(K), white, T, Ts, limit=limit, seed=seed, guess=start)
-    c = np.linalg.solve(frame, c.T.astype(np.float64)).T
+    c = (c @ np.linalg.inv(frame).T).astype(np.float64)
     if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
         return None
     return c
