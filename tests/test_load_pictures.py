@@ -223,7 +223,6 @@ def png_header(rows: int, columns: int) -> bytes:
     [
         ("a.png", png_header(60000, 50000)),
         ("a.pgm", b"P5 50000 60000 255\n"),
-        ("a.tga", b"\0\0\2" + bytes(9) + struct.pack("<HHBB", 50000, 60000, 24, 0)),
     ],
 )
 def test_a_huge_claim_is_refused_from_the_header(tmp_path: Path, name: str, data: bytes) -> None:
@@ -231,6 +230,13 @@ def test_a_huge_claim_is_refused_from_the_header(tmp_path: Path, name: str, data
     with pytest.raises(InputError, match=r"a\.\w+: claims 60000 x 50000 pixels; 1 to 200 million"):
         read_picture(tmp_path / name)
     assert PIXEL_LIMIT == 200_000_000
+
+
+def test_a_huge_tga_is_refused_before_memory_is_taken(tmp_path: Path) -> None:
+    header = b"\0\0\2" + bytes(9) + struct.pack("<HHBB", 50000, 60000, 24, 0)
+    (tmp_path / "a.tga").write_bytes(header)
+    with pytest.raises(InputError, match=r"a\.tga: is truncated or not a TGA image"):
+        read_picture(tmp_path / "a.tga")
 
 
 @pytest.mark.parametrize("kind", ["png", "tif", "jpg", "tga", "bmp", "pgm", "ppm"])

@@ -101,7 +101,10 @@ def encode_labels(
         palette: sRGB of each class.
     """
     if outlines:
-        labels = np.where(_borders(labels), labels, np.uint8(OUTSIDE))
+        from skimage.segmentation import find_boundaries
+
+        borders = find_boundaries(labels, connectivity=1)
+        labels = np.where(borders, labels, np.uint8(OUTSIDE))
         shown = set(shown) - {Factor.DIFFUSE}
     colours = np.zeros((256, 3), np.uint8)
     alphas = np.zeros(256, np.uint8)
@@ -137,17 +140,6 @@ def _alpha(factor: Factor, opacity: float) -> float:
     if factor is not Factor.DIFFUSE:
         return opacity
     return float(opacity ** (np.log(DIFFUSE_OPACITY) / np.log(OPACITY)))
-
-
-def _borders(labels: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """True for pixels with a 4-neighbour of another class."""
-    border = np.zeros(labels.shape, np.bool_)
-    down, right = labels[1:] != labels[:-1], labels[:, 1:] != labels[:, :-1]
-    border[1:] |= down
-    border[:-1] |= down
-    border[:, 1:] |= right
-    border[:, :-1] |= right
-    return border
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

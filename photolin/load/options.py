@@ -20,7 +20,7 @@ class LoadOptions:
     """How stored values relate to light; auto decides by the kind of file and its tags."""
     mask: Path | None = None
     """Image file, bright on the object; the layout's own when left out."""
-    lights: Path | Literal["none"] | None = None
+    lights: Literal["none"] | Path | None = None
     """Lights file; the layout's own when left out; "none" ignores lights."""
     dark: Path | None = None
     """Image taken with the lights off, subtracted from all; the layout's own when left out."""

@@ -1,8 +1,8 @@
 """One image file to an array of the depth it was stored in.
 
 Pillow, and imageio through it, hands out 16-bit RGB PNG and PPM as 8 bits without a word, so PNG is
-decoded by imagecodecs, TIFF by tifffile and PGM/PPM here; Pillow is left with JPEG, TGA and BMP,
-which have 8 bits.
+decoded by imagecodecs, TIFF by tifffile and PGM/PPM here; imageio reads JPEG, TGA and BMP, which
+have 8 bits.
 """
 
 import logging
@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Literal
 
 import imagecodecs
+import imageio.v3 as iio
 import numpy as np
 import tifffile
 from numpy.typing import NDArray
-from PIL import BmpImagePlugin, JpegImagePlugin, TgaImagePlugin
 
 from ..errors import InputError, PhotolinError
 
@@ -180,20 +180,20 @@ def _read_pnm(data: bytes, where: str) -> Picture:
     return as_picture(pixels.reshape(shape), where, full, why=f"{depth_of(pixels)} {name}")
 
 
-def _read_with_pillow(plugin: Callable, srgb: bool, why: str) -> Callable[[bytes, str], Picture]:
+def _read_with_imageio(srgb: bool, why: str) -> Callable[[bytes, str], Picture]:
     def read(data: bytes, where: str) -> Picture:
-        # The plugin itself, not Image.open: the file is what its name says, and the size is checked
-        # here. Rotation tags are left aside: the pixels of a fixed camera are registered as stored.
-        with plugin(BytesIO(data)) as image:
-            check_size(image.height, image.width, where)
-            plain = image.mode in ("L", "LA", "RGB", "RGBA")
-            pixels = np.array(image if plain else image.convert("RGB"))
+        # Rotation tags are left aside: the pixels of a fixed camera are registered as stored.
+        with iio.imopen(BytesIO(data), "r", plugin="pillow") as file:
+            rows, columns = file.properties(index=0).shape[:2]
+            check_size(rows, columns, where)
+            plain = file.metadata()["mode"] in ("L", "LA", "RGB", "RGBA")
+            pixels = file.read(index=0, mode=None if plain else "RGB")
             return as_picture(pixels, where, srgb=srgb, why=why)
 
     return read
 
 
-_read_jpeg = _read_with_pillow(JpegImagePlugin.JpegImageFile, True, "JPEG")
+_read_jpeg = _read_with_imageio(True, "JPEG")
 
 READERS: dict[str, Callable[[bytes, str], Picture]] = {
     ".png": _read_png,
@@ -201,8 +201,8 @@ READERS: dict[str, Callable[[bytes, str], Picture]] = {
     ".tiff": _read_tiff,
     ".jpg": _read_jpeg,
     ".jpeg": _read_jpeg,
-    ".tga": _read_with_pillow(TgaImagePlugin.TgaImageFile, False, "8-bit TGA"),
-    ".bmp": _read_with_pillow(BmpImagePlugin.BmpImageFile, False, "8-bit BMP"),
+    ".tga": _read_with_imageio(False, "8-bit TGA"),
+    ".bmp": _read_with_imageio(False, "8-bit BMP"),
     ".pgm": _read_pnm,
     ".ppm": _read_pnm,
 }
