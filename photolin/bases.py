@@ -78,7 +78,6 @@ def score_triples(
     for start in range(0, len(triples), CHUNK):
         chunk = triples[start : start + CHUNK]
         common = np.all(lit[chunk], axis=1)
-        count = np.count_nonzero(common, axis=1)
         v = values[chunk] * common[:, None]
         s = v if lights is None else lights[chunk]
         spread = gram_determinants(s @ s.transpose(0, 2, 1))

@@ -1,5 +1,7 @@
 """Adaptive sample consensus: how many samples are enough, and rows fitted with them."""
 
+from math import ceil, inf, isfinite, log1p
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,11 +20,12 @@ def samples_needed(inlier_share: float, confidence: float = CONFIDENCE) -> float
     """
     clean = inlier_share**3
     if clean <= 0:
-        return np.inf
+        return inf
     if clean >= confidence:
         return 1
     # log1p keeps small shares from rounding to log(1) = 0, which would ask for no samples at all
-    return float(np.ceil(np.log1p(-confidence) / np.log1p(-clean)))
+    wanted = log1p(-confidence) / log1p(-clean)
+    return ceil(wanted) if isfinite(wanted) else inf
 
 
 def stopping_table(limit: int, steps: int = 64) -> NDArray[np.int64]:

@@ -66,7 +66,7 @@ class Thresholds:
             raise OptionError(f"Ts is {self.Ts:g}; accepted is a number from 0 to below 1")
 
 
-def classify(i: ArrayLike, l: ArrayLike, thresholds: Thresholds) -> NDArray[np.uint8]:  # noqa: E741
+def classify(i: ArrayLike, l: ArrayLike, thresholds: Thresholds) -> NDArray[np.uint8]:
     """Label observations by Eq. (3).
 
     Args:
@@ -78,7 +78,7 @@ def classify(i: ArrayLike, l: ArrayLike, thresholds: Thresholds) -> NDArray[np.u
         Factor codes, uint8, of the broadcast shape. Every (i, l) gets exactly one; NaN gets
         UNDEFINED. Compared in float32, the precision stacks and results are stored in.
     """
-    i, l = np.asarray(i, np.float32), np.asarray(l, np.float32)  # noqa: E741
+    i, l = np.asarray(i, np.float32), np.asarray(l, np.float32)
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
     with np.errstate(invalid="ignore", over="ignore"):
         lit, dark, excess, slack = i >= Ts, i < Ts, i - l, T * i

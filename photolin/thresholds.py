@@ -17,13 +17,16 @@ from .factorize import (
 from .factors import Thresholds
 from .sample import Sample
 
-MIN_TS = 0.003
-"""Below this a Ts would tell nothing: 16-bit rounding and grazing light look alike."""
 MIN_T, MAX_T = 0.008, 0.12
 FIRST_T = 0.05
-STEP = 0.0005
-LEVELS = 512
-"""Histogram bins over full scale when looking for the shadow level."""
+LEVELS = 256
+"""Histogram bins from black to the brightest grays when looking for the shadow level."""
+FLOOR = 1
+"""Bins that Ts spans where shadows are exactly dark: below, grazing light looks like them."""
+CEILING = 24
+"""Bins that Ts spans at most: what falls off more slowly is a dark surface, not a shadow level."""
+GRAYS = slice(32, 96)
+"""Bins whose level the dark mode has to rise from: beyond shadows, still dark."""
 SMOOTHING = np.array([1, 4, 6, 4, 1]) / 16
 
 
@@ -33,8 +36,9 @@ class Suggestion:
 
     thresholds: Thresholds
     histogram: NDArray[np.float64]
-    """(LEVELS//4,) observations in bins of 1/LEVELS of full scale from 0, single images' own peaks
-    left out."""
+    """(LEVELS/2,) observations in bins of `bin_width` from 0, single images' own peaks left out."""
+    bin_width: float
+    """Fraction of full scale."""
     noise: float
     """Standard deviation of (i - l)/i below the fit, where no highlight can be."""
     starts: tuple[tuple[int, int, int], ...]
@@ -61,8 +65,8 @@ def suggest_thresholds(
     Raises:
         DegenerateError: the images do not determine coefficients.
     """
-    histogram = dark_histogram(sample.images)
-    Ts = shadow_level(histogram) if options.Ts is None else options.Ts
+    histogram, bin_width = dark_histogram(sample.images)
+    Ts = bin_width * shadow_bins(histogram) if options.Ts is None else options.Ts
     starts = find_starts(sample, Ts, options, lights)
     noise, T, found = 0.0, FIRST_T if options.T is None else options.T, None
     for _ in range(2 if options.T is None else 0):
@@ -70,20 +74,16 @@ def suggest_thresholds(
         found = provisional(sample, starts, now, options, lights, found, cancel)
         noise = lower_noise(sample.images, found.coefficients, found.bases, now)
         T = float(np.clip(3 * noise, MIN_T, MAX_T))
-    T = round_to_step(T) if options.T is None else T
-    Ts = round_to_step(Ts) if options.Ts is None else Ts
+    T = round(T, 4) if options.T is None else T
+    Ts = round(Ts, 4) if options.Ts is None else Ts
     return Suggestion(
         Thresholds(T, Ts),
         histogram,
+        bin_width,
         noise,
         tuple(starts),
         None if found is None else found.coefficients,
     )
-
-
-def round_to_step(threshold: float) -> float:
-    """A threshold on the grid that sliders move on, so that what is suggested can be set by hand."""
-    return round(round(threshold / STEP) * STEP, 4)
 
 
 def provisional(
@@ -117,27 +117,28 @@ def find_starts(
     return choose_bases(sample, Ts, options.seed, lights, count=6)
 
 
-def dark_histogram(images: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Histogram of positive observations below a quarter of full scale, one row an image.
+def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], float]:
+    """Histogram of the darker half of the grays, one row of `images` an image, and its bin width.
 
     A shadow level is common to the images; a plane lit at a grazing angle makes a peak in one
     image. So the two fullest images of each bin do not count.
     """
-    bins = np.arange(LEVELS // 4 + 1) / LEVELS
+    bin_width = float(np.quantile(images, 0.99)) / LEVELS
+    bins = np.arange(LEVELS // 2 + 1) * bin_width
     # exact zeros are left out: noise clipped at zero piles up there and hides the mode's width
     rows = [np.histogram(image[image > 0], bins)[0] for image in images]
-    return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64)
+    return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64), bin_width
 
 
-def shadow_level(histogram: NDArray[np.float64]) -> float:
-    """Ts from `dark_histogram`; MIN_TS where shadows are exactly dark."""
+def shadow_bins(histogram: NDArray[np.float64]) -> int:
+    """How many bins of `dark_histogram` the shadows fill; FLOOR where they are exactly dark."""
     smooth = np.convolve(np.pad(histogram, 2, mode="edge"), SMOOTHING, mode="valid")
-    grays = 1.5 * np.median(smooth[LEVELS // 10 :])
-    peak = int(np.argmax(smooth[: LEVELS // 12]))
+    grays = np.median(smooth[GRAYS])
+    peak = int(np.argmax(smooth[:CEILING]))
     if smooth[peak] <= 2 * grays:
-        return MIN_TS
-    above = np.flatnonzero(smooth[peak:] <= grays)
-    return max(MIN_TS, (peak + int(above[0])) / LEVELS)
+        return FLOOR
+    above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
+    return peak + int(above[0]) + 1 if above.size else CEILING
 
 
 def lower_noise(
@@ -147,7 +148,7 @@ def lower_noise(
     thresholds: Thresholds,
 ) -> float:
     """Standard deviation of (i - l)/i among D observations with i < l."""
-    l = coefficients.astype(np.float32) @ bases  # noqa: E741
+    l = coefficients.astype(np.float32) @ bases
     with np.errstate(invalid="ignore", divide="ignore"):
         short = (l - images) / images
     short = short[(images >= thresholds.Ts) & (short > 0) & (short <= thresholds.T)]

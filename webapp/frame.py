@@ -34,7 +34,7 @@ class PixelValues:
 
     i: NDArray[np.float32]
     """(K,) input, fraction of full scale."""
-    l: NDArray[np.float32]  # noqa: E741
+    l: NDArray[np.float32]
     """(K,) linearized, signed."""
     labels: NDArray[np.uint8]
     """(K,) Factor codes."""
@@ -67,5 +67,5 @@ def pixel_values(
     c = analysis.coefficients.astype(np.float32)
     b = analysis.linearized_bases[:, row, column]
     # in the order and precision of the label loop, so that both always agree
-    l = c[:, 0] * b[0] + c[:, 1] * b[1] + c[:, 2] * b[2]  # noqa: E741
+    l = c[:, 0] * b[0] + c[:, 1] * b[1] + c[:, 2] * b[2]
     return PixelValues(i, l, classify(i, l, thresholds))

@@ -99,5 +99,5 @@ def describe(frame: Frame, pixel: Pixel) -> str:
     i = float(frame.stack.images[k, row, column])
     if frame.analysis is None or frame.labels is None:
         return f"row {row}  column {column}  i {i:.3f}"
-    l = float(frame.analysis.coefficients[k] @ frame.analysis.linearized_bases[:, row, column])  # noqa: E741
+    l = float(frame.analysis.coefficients[k] @ frame.analysis.linearized_bases[:, row, column])
     return status_line(row, column, i, l, int(frame.labels[row, column]))

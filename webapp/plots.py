@@ -28,7 +28,7 @@ class PixelPanel:
     """Heading, as the method's name."""
     i: NDArray[np.float32]
     """(K,) input, fraction of full scale."""
-    l: NDArray[np.float32]  # noqa: E741
+    l: NDArray[np.float32]
     """(K,) linearized (signed), fraction of full scale; NaN is left out."""
     labels: NDArray[np.uint8]
     """(K,) Factor codes."""
@@ -42,7 +42,7 @@ class _Axes:
     high: float
     side: int
 
-    def at(self, i: float, l: float) -> Point:  # noqa: E741
+    def at(self, i: float, l: float) -> Point:
         """Drawing coordinates of (i, l) from the square's upper left corner."""
         unit = self.side / (self.high - self.low)
         return round((i - self.low) * unit, 2), round((self.high - l) * unit, 2)
@@ -73,9 +73,9 @@ def plot_pixel(
 def _choose_axes(panels: Sequence[PixelPanel], Ts: float) -> _Axes:
     """Hold every dot, unless l is far outside the range of i: such dots go to the border."""
     i = np.concatenate([panel.i for panel in panels])
-    l = np.concatenate([panel.l for panel in panels])  # noqa: E741
+    l = np.concatenate([panel.l for panel in panels])
     bright = max(float(i.max()), 2 * Ts, 1e-3)
-    l = l[np.isfinite(l)].clip(-bright, 1.5 * bright)  # noqa: E741
+    l = l[np.isfinite(l)].clip(-bright, 1.5 * bright)
     high = 1.06 * max(bright, float(l.max(initial=0)))
     low = min(float(l.min(initial=0)) - 0.08 * high, -0.14 * high)
     return _Axes(low, high, side=260 if len(panels) == 1 else 150)
@@ -156,7 +156,7 @@ def _dots(panel: PixelPanel, axes: _Axes, current: int, names: Sequence[str]) ->
 
 
 def _dot(panel: PixelPanel, k: int, axes: _Axes, name: str, *, ringed: bool) -> str:
-    i, l, factor = float(panel.i[k]), float(panel.l[k]), Factor(int(panel.labels[k]))  # noqa: E741
+    i, l, factor = float(panel.i[k]), float(panel.l[k]), Factor(int(panel.labels[k]))
     x, y = axes.at(i, min(max(l, axes.low), axes.high))
     ring = f'<circle cx="{x}" cy="{y}" r="9" fill="none" stroke="currentColor" stroke-width="2"/>'
     return (

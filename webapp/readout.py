@@ -32,7 +32,7 @@ def escape(text: str) -> str:
     return re.sub(r"[^\w ]|_", lambda match: f"&#{ord(match[0])};", text)
 
 
-def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:  # noqa: E741
+def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:
     """The rule of Eq. (3) that decided one observation, with its numbers.
 
     Args:
@@ -44,7 +44,7 @@ def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:  # no
     factor = Factor(int(classify(i, l, thresholds)))
     if not np.isfinite(l):
         return f"{name}: i {_number(i)} of full scale; l could not be determined: undefined."
-    i, l, T, Ts = (float(np.float32(v)) for v in (i, l, thresholds.T, thresholds.Ts))  # noqa: E741
+    i, l, T, Ts = (float(np.float32(v)) for v in (i, l, thresholds.T, thresholds.Ts))
     observed = f"{name}: i {_number(i)}, l {_number(l)} of full scale."
     lit, level = _apart(i, Ts)
     if i < Ts:
@@ -57,7 +57,7 @@ def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:  # no
     return f"{observed} i = {lit} ≥ Ts = {level} and {_lit_rule(factor, i, l, T)}."
 
 
-def _lit_rule(factor: Factor, i: float, l: float, T: float) -> str:  # noqa: E741
+def _lit_rule(factor: Factor, i: float, l: float, T: float) -> str:
     distance, slack = _apart(abs(i - l), T * i)
     if factor is Factor.DIFFUSE:
         return f"|i - l| = {distance} ≤ T·i = {slack}: diffuse"
@@ -91,7 +91,7 @@ def describe_pixel(
     return f"{sentence}."
 
 
-def status_line(row: int, column: int, i: float, l: float, label: int) -> str:  # noqa: E741
+def status_line(row: int, column: int, i: float, l: float, label: int) -> str:
     """Values under the pointer, in one line; fractions of full scale."""
     if label == OUTSIDE:
         return f"row {row}  column {column}  i {i:.3f}  outside the mask"

@@ -28,7 +28,7 @@ def _score(x, a0, a1, a2, n, v, T):  # pragma: no cover
     diffuse = np.int32(0)
     against = np.int32(0)
     for m in range(n):
-        l = a0[m] * v0 + a1[m] * v1 + a2[m] * v2  # noqa: E741
+        l = a0[m] * v0 + a1[m] * v1 + a2[m] * v2
         excess = x[m] - l
         slack = T * x[m]
         d = abs(excess) <= slack
@@ -155,6 +155,12 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
             if not _refit(x, a0, a1, a2, n, v, T, w):
                 break
             v[0], v[1], v[2] = w[0], w[1], w[2]
+    if score == UNFIT:
+        # all samples lie near a plane: the best that can be said is what fits them all
+        v[:] = 0
+        if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
+            best[0], best[1], best[2] = w[0], w[1], w[2]
+            score, _ = _score(x, a0, a1, a2, n, best, T)
     return score
 
 

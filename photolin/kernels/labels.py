@@ -18,7 +18,7 @@ def label_rows(image, bases, c, mask, T, Ts, labels, start, stop):  # pragma: no
     """
     for p in range(start, stop):
         i = image[p]
-        l = c[0] * bases[0, p] + c[1] * bases[1, p] + c[2] * bases[2, p]  # noqa: E741
+        l = c[0] * bases[0, p] + c[1] * bases[1, p] + c[2] * bases[2, p]
         excess = i - l
         slack = T * i
         lit = i >= Ts

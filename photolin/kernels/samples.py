@@ -33,7 +33,7 @@ def support_rows(X, A, triples, inverses, T, Ts, out, support, start, stop):  # 
             count = 0
             for m in range(M):
                 i = x[m]
-                l = A[0, m] * v0 + A[1, m] * v1 + A[2, m] * v2  # noqa: E741
+                l = A[0, m] * v0 + A[1, m] * v1 + A[2, m] * v2
                 count += (i >= Ts) & (abs(i - l) <= T * i)
             if count > best:
                 best = count
