@@ -17,7 +17,7 @@ import viser
 import viser.infra._infra
 import websockets.asyncio.server
 from browser import encode_png, wait_until
-from viser import _gui_api, _gui_handles, _messages, _scene_api, _viser
+from viser import _gui_api, _gui_handles, _messages, _viser
 from websockets.sync.client import ClientConnection, connect
 
 from photolin.errors import OptionError
@@ -489,8 +489,6 @@ def test_the_private_names_of_viser_still_mean_the_same() -> None:
     assert _messages.RunJavascriptMessage("1").source == "1"
     assert {"_format", "_data"} <= set(_messages.ImageProps.__annotations__)
     assert "uuid" in _gui_handles._GuiHandleState.__annotations__
-    dispatch = inspect.getsource(_scene_api.SceneApi._handle_scene_pointer_updates)
-    assert "await self._dispatch_callback" in dispatch
     assert inspect.signature(websockets.asyncio.server.serve.__init__).parameters.keys() >= {
         "process_request",
         "create_connection",

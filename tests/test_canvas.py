@@ -22,35 +22,9 @@ from browser import (
 )
 
 from webapp.access import Server, open_server
-from webapp.canvas import WORLD_HEIGHT, Canvas, pixel_in_text, pixel_on_ray
+from webapp.canvas import Canvas, pixel_in_text
 
 pytestmark = pytest.mark.filterwarnings("error")
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (60, 80), (2048, 3072)])
-def test_a_ray_through_the_centre_of_a_pixel_finds_that_pixel(shape: tuple[int, int]) -> None:
-    rng = np.random.default_rng(3)
-    rows, columns = rng.integers(0, shape[0], 50), rng.integers(0, shape[1], 50)
-    origin = np.array([1.5, -2.0, -7.0])
-    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-        side = WORLD_HEIGHT / shape[0]
-        target = [(column + 0.5 - shape[1] / 2) * side, (row + 0.5 - shape[0] / 2) * side, 0]
-        assert pixel_on_ray(origin, np.array(target) - origin, shape) == (row, column)
-
-
-@pytest.mark.parametrize(
-    ("origin", "direction"),
-    [
-        ((0, 5.001, -9), (0, 0, 1)),
-        ((-5.001, 0, -9), (0, 0, 1)),
-        ((0, 0, -9), (1, 0, 0)),
-        ((0, 0, -9), (0, 0, 0)),
-        ((float("nan"), 0, -9), (0, 0, 1)),
-        ((0, 0, 1e300), (1e300, 0, 1e-300)),
-    ],
-)
-def test_a_ray_beside_the_picture_finds_nothing(origin: Any, direction: Any) -> None:
-    assert pixel_on_ray(origin, direction, (10, 10)) is None
 
 
 @pytest.mark.parametrize("text", ["", "1", "-1,2", "60,0", "0,80", "1,2,3", "nan,1", "9" * 4000])

@@ -5,13 +5,14 @@
 // its image on screen is a similarity, described by {scale, left, top} in CSS pixels.
 "use strict";
 
-window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => {
+window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyId }) => {
   window.photolin?.close();
 
   const TRUCK = 2, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
   const NEAREST = 1003; // three.js NearestFilter
   const MARGIN = 0.98, GRID_SCALE = 16, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
   const HOVER_MS = 50;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
   const viewer = window.__viserMutable;
@@ -22,6 +23,10 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     target.addEventListener(type, listener, { capture, signal: closing.signal });
   const send = (uuid, value) =>
     viewer.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value } });
+
+  let reports = 0;
+  /** Send an event, numbered, because the same value again would be no change of the widget. */
+  const report = (uuid, text) => text && send(uuid, `${++reports} ${text}`);
 
   // --- camera ---
 
@@ -212,14 +217,24 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     }, HOVER_MS);
   }
 
+  /** The pixel under the middle of the device pixel that the pointer is on, "" beside the picture. */
   function pixelUnder(event) {
     if (!placed()) return "";
     const box = canvas.getBoundingClientRect();
     const { scale, left, top } = similarity();
-    const row = Math.floor((event.clientY - box.top + 0.5 - top) / scale);
-    const column = Math.floor((event.clientX - box.left + 0.5 - left) / scale);
+    const middle = 0.5 / window.devicePixelRatio;
+    const row = Math.floor((event.clientY - box.top + middle - top) / scale);
+    const column = Math.floor((event.clientX - box.left + middle - left) / scale);
     const inside = row >= 0 && row < rows && column >= 0 && column < columns;
     return inside ? `${row},${column}` : "";
+  }
+
+  let pressed = null; // pointerdown that may become a click
+
+  function release(event) {
+    const moved = pressed && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY);
+    if (pressed && moved <= CLICK_PIXELS) report(pickId, pixelUnder(event));
+    pressed = null;
   }
 
   /** Whether the focused widget uses this key itself. */
@@ -231,7 +246,6 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
     return key === " " || key === "Enter" || key === "Tab" || (movable && key.startsWith("Arrow"));
   }
 
-  let keysSent = 0;
   const local = { f: fit, g: oneToOne, " ": () => peek(true) };
 
   function peek(on) {
@@ -246,12 +260,16 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
       event.preventDefault();
       if (!event.repeat && placed()) action();
     } else if (event.key.length === 1 || event.key.startsWith("Arrow") || event.key === "Escape") {
-      send(keyId, `${++keysSent} ${event.key}`); // numbered: the same key again is a new value
+      report(keyId, event.key);
     }
   }
 
   listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
   listen(canvas, "pointerleave", () => hover(""));
+  listen(canvas, "pointerdown", (event) => {
+    pressed = event.isPrimary && event.button === 0 ? event : null;
+  });
+  listen(canvas, "pointerup", release);
   listen(canvas, "dblclick", () => placed() && fit());
   listen(window, "keydown", onKey, true);
   listen(window, "keyup", (event) => event.key === " " && peeking && peek(false), true);
@@ -275,7 +293,9 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, keyId }) => 
 
   // The note on software WebGL covers the picture.
   for (const note of document.querySelectorAll(".mantine-Notification-root")) {
-    if (note.textContent.includes("Software WebGL")) note.querySelector("button")?.click();
+    if (!note.textContent.includes("Software WebGL")) continue;
+    note.style.display = "none"; // at once: it takes clicks while it fades
+    note.querySelector("button")?.click();
   }
 
   // "Reset View" and changes of the world's orientation end here.

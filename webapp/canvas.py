@@ -8,11 +8,10 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 """
 
 import functools
-import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal
 
 import numpy as np
 import viser
@@ -49,8 +48,11 @@ class Canvas:
             )
             for name in _PLANES
         )
-        self._hover = client.gui.add_text("hover", "", visible=False)
-        self._key = client.gui.add_text("key", "", visible=False)
+        # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
+        # screens with more than one pixel in it: the page writes them into hidden fields.
+        self._hover, self._pick, self._key = (
+            client.gui.add_text(name, "", visible=False) for name in ("hover", "pick", "key")
+        )
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -58,6 +60,7 @@ class Canvas:
             "planes": _PLANES,
             "worldHeight": WORLD_HEIGHT,
             "hoverId": widget_id(self._hover),
+            "pickId": widget_id(self._pick),
             "keyId": widget_id(self._key),
         }
         call_javascript(client, "window.openCanvas", options)
@@ -100,14 +103,11 @@ class Canvas:
     def on_pick(self, callback: Callable[[Pixel], None]) -> None:
         """Call back with the pixel that was clicked; clicks beside the picture do nothing."""
 
-        async def clicked(event: viser.SceneClickEvent) -> None:
-            pixel = pixel_on_ray(event.ray_origin, event.ray_direction, self._shape)
+        @self._pick.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            pixel = pixel_in_text(self._pick.value.partition(" ")[2], self._shape)
             if pixel is not None:
                 callback(pixel)
-
-        # The ray of a click on the scene is exact, that of a click on a node half a pixel off.
-        # on_click is typed for plain functions only, which would run in parallel and out of order.
-        self._client.scene.on_click()(cast(Any, clicked))
 
     def on_hover(self, callback: Callable[[Pixel | None], None]) -> None:
         """Call back with the pixel under the pointer, None beside it, at most 20 times a second."""
@@ -132,32 +132,11 @@ class Canvas:
         call_javascript(self._client, "window.photolin.setMarks", [*self._pins, *marker])
 
 
-def pixel_on_ray(
-    origin: Sequence[float], direction: Sequence[float], shape: tuple[int, int]
-) -> Pixel | None:
-    """The (row, column) where a ray meets the picture plane z = 0, or None beside it.
-
-    The plane is centred on the world's origin, columns along x, rows along y, WORLD_HEIGHT high.
-    """
-    if direction[2] == 0:
-        return None
-    pixel_side = WORLD_HEIGHT / shape[0]
-    along = -origin[2] / direction[2]
-    column = (origin[0] + along * direction[0]) / pixel_side + shape[1] / 2
-    row = (origin[1] + along * direction[1]) / pixel_side + shape[0] / 2
-    if not (math.isfinite(row) and math.isfinite(column)):
-        return None
-    return _inside((math.floor(row), math.floor(column)), shape)
-
-
 def pixel_in_text(text: str, shape: tuple[int, int]) -> Pixel | None:
     """The pixel that the page wrote as "row,column", or None when it is none of the picture."""
     numbers = re.fullmatch(r"([0-9]{1,6}),([0-9]{1,6})", text)
-    return _inside((int(numbers[1]), int(numbers[2])), shape) if numbers else None
-
-
-def _inside(pixel: Pixel, shape: tuple[int, int]) -> Pixel | None:
-    return pixel if 0 <= pixel[0] < shape[0] and 0 <= pixel[1] < shape[1] else None
+    pixel = (int(numbers[1]), int(numbers[2])) if numbers else shape
+    return pixel if pixel[0] < shape[0] and pixel[1] < shape[1] else None
 
 
 @functools.cache

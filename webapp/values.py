@@ -1,4 +1,4 @@
-"""What a connected page may say: four kinds of message, each value as its widget could send it.
+"""What a connected page may say: three kinds of message, each value as its widget could send it.
 
 viser believes every value and lets a client set any attribute of a widget, its callbacks
 included. A message that none of our own widgets could have sent is dropped here.
@@ -40,16 +40,6 @@ class ViewerCameraMessage(_Sent):
     up_direction: _Vector
 
 
-class ScenePointerMessage(_Sent):
-    """The scene was clicked."""
-
-    event_type: Literal["click"]
-    ray_origin: _Vector
-    ray_direction: _Vector
-    screen_pos: tuple[tuple[float, float]]
-    modifier: Annotated[str, msgspec.Meta(max_length=32)] | None
-
-
 class GuiUpdateMessage(_Sent):
     """A widget has a new value; any other attribute of it is none of the client's business."""
 
@@ -66,9 +56,7 @@ class CommandTriggerMessage(_Sent):
     uuid: str
 
 
-_decoder = msgspec.msgpack.Decoder(
-    ViewerCameraMessage | ScenePointerMessage | GuiUpdateMessage | CommandTriggerMessage
-)
+_decoder = msgspec.msgpack.Decoder(ViewerCameraMessage | GuiUpdateMessage | CommandTriggerMessage)
 
 
 def sift(frame: object, server: viser.ViserServer) -> bytes | None:
