@@ -1,0 +1,307 @@
+"""Each compiled loop against a plain twin, written to be read rather than to be fast.
+
+Where a loop and its twin do the same single-precision operations in the same order, they must
+agree bit for bit; the centre of gravity is summed in another order and agrees to rounding.
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_factors import SETTINGS, plane
+
+from photolin.consensus import stopping_table
+from photolin.factors import OUTSIDE, Thresholds, classify
+from photolin.kernels import centre_rows, consensus_rows, label_rows, support_rows
+from photolin.kernels.consensus import UNFIT
+
+f32, f64 = np.float32, np.float64
+Array = np.ndarray
+
+
+def problem(
+    seed: int, rows: int, observations: int, outliers: float = 0.2
+) -> tuple[Array, Array, Array]:
+    """Observations X (rows,M) = V A with outliers and shadows, factors A (3,M) and V (rows,3)."""
+    rng = np.random.default_rng(seed)
+    A, V = rng.normal(size=(3, observations)), rng.normal(size=(rows, 3)) / 3
+    X = np.abs(V @ A) * rng.normal(1, 0.01, (rows, observations))
+    wrong = rng.random(X.shape)
+    X[wrong < outliers] += 0.3
+    X[wrong > 0.9] = 0
+    return np.clip(X, 0, 1).astype(f32), A.astype(f32), V.astype(f32)
+
+
+def samples(seed: int, A: Array, count: int) -> tuple[Array, Array]:
+    """Triples (count,3) and the inverses of A at them."""
+    rng = np.random.default_rng(seed)
+    triples = np.array([rng.choice(A.shape[1], 3, replace=False) for _ in range(count)])
+    return triples, np.linalg.inv(A[:, triples].transpose(1, 2, 0).astype(f64)).astype(f32)
+
+
+# Labels
+
+
+def label(image: Array, bases: Array, c: Array, mask: Array, T: float, Ts: float) -> Array:
+    l = c[0] * bases[0] + c[1] * bases[1] + c[2] * bases[2]
+    return np.where(mask, classify(image, l, Thresholds(T, Ts)), np.uint8(OUTSIDE))
+
+
+@pytest.mark.parametrize(("T", "Ts"), SETTINGS)
+@pytest.mark.parametrize("loop", [label_rows, label_rows.py_func])
+def test_labels_are_those_of_classify_on_the_whole_plane(loop: Any, T: float, Ts: float) -> None:
+    i, l = (a.ravel() for a in plane(T, Ts))
+    bases = np.stack((l, np.zeros_like(l), np.zeros_like(l)))
+    one, mask, labels = np.array([1, 0, 0], f32), np.ones(len(i), bool), np.empty(len(i), np.uint8)
+    with np.errstate(all="ignore"):
+        loop(i, bases, one, mask, f32(T), f32(Ts), labels, 0, len(i))
+    np.testing.assert_array_equal(labels, classify(i, l, Thresholds(T, Ts)))
+
+
+def test_labels_are_those_of_the_twin_bit_for_bit_and_only_in_their_range() -> None:
+    rng = np.random.default_rng(0)
+    image, bases = rng.random(5000).astype(f32), rng.normal(size=(3, 5000)).astype(f32)
+    c, mask = rng.normal(size=3).astype(f32), rng.random(5000) > 0.3
+    # half of them on or next to the bound of diffuse
+    l = c[0] * bases[0] + c[1] * bases[1] + c[2] * bases[2]
+    image[::2] = np.abs(l[::2] / f32(0.95))
+    labels = np.full(5000, 77, np.uint8)
+    label_rows(image, bases, c, mask, f32(0.05), f32(0.1), labels, 100, 4900)
+    np.testing.assert_array_equal(
+        labels[100:4900], label(image, bases, c, mask, 0.05, 0.1)[100:4900]
+    )
+    assert (labels[:100] == 77).all()
+    assert (labels[4900:] == 77).all()
+
+
+# Maximum support among shared samples
+
+
+def support(
+    X: Array, A: Array, triples: Array, inverses: Array, T: float, Ts: float
+) -> tuple[Array, Array]:
+    out, best = [], []
+    for x in X:
+        v = inverses[..., 0] * x[triples[:, 0], None]
+        v = v + inverses[..., 1] * x[triples[:, 1], None]
+        v = v + inverses[..., 2] * x[triples[:, 2], None]
+        l = v[:, :1] * A[0] + v[:, 1:2] * A[1] + v[:, 2:] * A[2]
+        votes = (x >= f32(Ts)) & (np.abs(x - l) <= f32(T) * x)
+        winner = votes.sum(axis=1).argmax()
+        out.append(v[winner])
+        best.append(votes[winner].sum() + (x < f32(Ts)).sum())
+    return np.array(out), np.array(best)
+
+
+@pytest.mark.parametrize("Ts", [0.0, 0.02, 0.9])
+def test_the_winner_by_support_is_the_twins_bit_for_bit(Ts: float) -> None:
+    X, A, _ = problem(1, 40, 30)
+    triples, inverses = samples(2, A, 60)
+    out, votes = np.full((40, 3), 7, f32), np.full(40, 7, np.int32)
+    support_rows(X, A, triples, inverses, f32(0.05), f32(Ts), out, votes, 3, 38)
+    expected = support(X[3:38], A, triples, inverses, 0.05, Ts)
+    np.testing.assert_array_equal(out[3:38], expected[0])
+    np.testing.assert_array_equal(votes[3:38], expected[1])
+    assert (out[[0, 2, 38, 39]] == 7).all()
+
+
+# Centre of gravity
+
+
+def centre(X: Array, triples: Array, inverses: Array, keep: int) -> Array:
+    out = []
+    for x in X:
+        v = np.stack([inverses[:, r] for r in range(3)], 1) * x[triples][:, None, :]
+        v = (v[..., 0] + v[..., 1] + v[..., 2]).astype(f64)
+        while True:
+            m = v.mean(axis=0)
+            distance = np.linalg.norm(v - m, axis=1)
+            near = distance <= distance.mean()
+            if distance.mean() <= 1e-6 * np.abs(m).sum() or near.all() or near.sum() < keep:
+                break
+            v = v[near]
+        out.append(m)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("keep", [1, 5, 59, 60])
+def test_the_centre_of_gravity_is_the_twins(keep: int) -> None:
+    X, A, _ = problem(3, 40, 30)
+    triples, inverses = samples(4, A, 60)
+    out = np.full((40, 3), 7, f32)
+    centre_rows(X, triples, inverses, keep, out, 3, 38)
+    expected = centre(X[3:38], triples, inverses, keep)
+    np.testing.assert_allclose(out[3:38], expected, rtol=1e-5, atol=1e-6)
+    assert (out[[0, 2, 38, 39]] == 7).all()
+
+
+def test_candidates_that_coincide_are_their_own_centre() -> None:
+    X, A, V = problem(5, 10, 30)
+    X = V @ A
+    triples, inverses = samples(6, A, 60)
+    out = np.empty((10, 3), f32)
+    centre_rows(X.astype(f32), triples, inverses, 3, out, 0, 10)
+    np.testing.assert_allclose(out, V, atol=2e-4)
+
+
+# Adaptive consensus
+
+
+def splitmix64(state: int) -> tuple[int, int]:
+    """The next state and the upper 32 bits of its output (Steele, Lea and Flood 2014)."""
+    state = (state + 0x9E3779B97F4A7C15) % 2**64
+    z = state
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
+    return state, (z ^ (z >> 31)) >> 32
+
+
+def three_of(n: int, state: int) -> tuple[int, list[int]]:
+    """Three different numbers below n: each drawn from what is left, in ascending order."""
+    drawn: list[int] = []
+    for left in (n, n - 1, n - 2):
+        state, r = splitmix64(state)
+        rest = [m for m in range(n) if m not in drawn]
+        drawn.append(rest[r % left])
+    return state, drawn
+
+
+def solve_exactly(x: Array, a: Array, ijk: list[int]) -> Array | None:
+    """v with a[ijk] v = x[ijk], by cross products; None where the three lie near a plane."""
+    p, q, r = a[ijk]
+    cross = np.cross([q, r, p], [r, p, q])
+    det = p[0] * cross[0][0] + p[1] * cross[0][1] + p[2] * cross[0][2]
+    n = [s[0] * s[0] + s[1] * s[1] + s[2] * s[2] for s in (p, q, r)]
+    if not float(det * det) > 1e-4 * float(n[0] * n[1] * n[2]):
+        return None
+    f, g, h = x[ijk] / det
+    return f * cross[0] + g * cross[1] + h * cross[2]
+
+
+def judge(x: Array, a: Array, v: Array, T: Array) -> tuple[int, Array, float]:
+    """D - U, which are D, and the misfit of D."""
+    l = a[:, 0] * v[0] + a[:, 1] * v[1] + a[:, 2] * v[2]
+    excess, slack = x - l, T * x
+    d = np.abs(excess) <= slack
+    u = ~d & ((excess < 0) | (l < 0))
+    ratio = excess[d] / slack[d]
+    return int(d.sum()) - int(u.sum()), d, float(np.cumsum([0, *(ratio * ratio)], dtype=f64)[-1])
+
+
+def least_squares(x: Array, a: Array) -> Array | None:
+    """v nearest to a v = x; None where it is not determined."""
+    b = a.astype(f64)
+    G = b.T @ b
+    if len(b) < 3 or not np.linalg.det(G) > 1e-9 * np.prod(np.diagonal(G)):
+        return None
+    return np.linalg.solve(G, b.T @ x.astype(f64)).astype(f32)
+
+
+def consensus(
+    x: Array, a: Array, T: Array, tries: Array, limit: int, state: int, guess: Array
+) -> tuple[int, Array]:
+    """Best score and solution for lit observations x (n,) with factors a (n,3)."""
+    best, score, diffuse, misfit = guess.copy(), UNFIT, 0, 0.0
+    if np.isfinite(guess[0]):
+        score, d, misfit = judge(x, a, best, T)
+        diffuse = int(d.sum())
+    drawn = 0
+    while drawn < min(limit, tries[diffuse * (len(tries) - 1) // len(x)]):
+        drawn += 1
+        state, ijk = three_of(len(x), state)
+        v = solve_exactly(x, a, ijk)
+        for step in range(3 if v is not None else 0):
+            s, d, e = judge(x, a, v, T)
+            if s < score:
+                break
+            if s > score or e < misfit:
+                best, score, diffuse, misfit = v.copy(), s, int(d.sum()), e
+            elif step > 0:
+                break
+            v = least_squares(x[d], a[d])
+            if v is None:
+                break
+    if score == UNFIT and (v := least_squares(x, a)) is not None:
+        best, score = v, judge(x, a, v, T)[0]
+    return score, best
+
+
+@pytest.mark.parametrize("limit", [1, 5, 500])
+@pytest.mark.parametrize("guessed", [False, True])
+def test_consensus_is_the_twins(limit: int, guessed: bool) -> None:
+    X, A, V = problem(7, 120, 14)
+    A[:, 5] = np.nan
+    X[:3, 2:] = 0  # lit in two
+    X[3, 3:] = 0  # lit in three
+    seed, tries = 123456789, stopping_table(limit)
+    columns = np.arange(119, -1, -1)
+    guess = np.where(np.arange(120) % 2 == 0, V.T * f32(1.02), np.nan).T[columns]
+    out = guess.astype(f32) if guessed else np.full((120, 3), np.nan, f32)
+    score = np.zeros(120, np.int32)
+    T, Ts, start = f32(0.05), f32(0.02), out.copy()
+    args = (T, Ts, tries, limit, np.uint64(seed), out, score, 0, 120)
+    consensus_rows(np.ascontiguousarray(X.T), columns, A, *args)
+    for r, column in enumerate(columns):
+        x = X[column]
+        lit = (x >= Ts) & (x > 0) & np.isfinite(A[0])
+        if lit.sum() < 3:
+            assert score[r] == UNFIT
+            assert np.isnan(out[r]).all()
+            continue
+        state = seed ^ (int(column) * 0xD1342543DE82EF95 % 2**64)
+        s, v = consensus(x[lit], A[:, lit].T, T, tries, limit, state, start[r])
+        assert score[r] == s
+        np.testing.assert_allclose(out[r], v, rtol=1e-5, atol=1e-6, equal_nan=True)
+
+
+def test_the_twins_random_bits_are_those_of_the_published_generator() -> None:
+    """First outputs for seed 1234567, as published with the reference code of splitmix64."""
+    state, upper = 1234567, []
+    for _ in range(5):
+        state, bits = splitmix64(state)
+        upper.append(bits)
+    published = [
+        6457827717110365317,
+        3203168211198807973,
+        9817491932198370423,
+        4593380528125082431,
+        16408922859458223821,
+    ]
+    assert upper == [p >> 32 for p in published]
+
+
+def test_factors_in_a_plane_are_unfit() -> None:
+    X, A, _ = problem(8, 5, 20)
+    A[2] = A[0] - 2 * A[1]
+    out, score = np.full((5, 3), np.nan, f32), np.zeros(5, np.int32)
+    tries, T = stopping_table(50), f32(0.05)
+    columns = np.arange(5)
+    args = (T, f32(0.0), tries, 50, np.uint64(0), out, score, 0, 5)
+    consensus_rows(np.ascontiguousarray(X.T), columns, A, *args)
+    assert (score == UNFIT).all()
+    assert np.isnan(out).all()
+
+
+def test_where_no_sample_is_apart_enough_all_observations_are_fitted() -> None:
+    rng = np.random.default_rng(9)
+    A = np.stack([np.ones(20), *rng.normal(0, 0.03, (2, 20))]).astype(f32)
+    x = (np.array([0.5, 0.2, -0.3]) @ A).astype(f32)
+    out, score = np.full((1, 3), np.nan, f32), np.zeros(1, np.int32)
+    args = (f32(0.05), f32(0.0), stopping_table(50), 50, np.uint64(0), out, score, 0, 1)
+    consensus_rows(x[:, None], np.arange(1), A, *args)
+    np.testing.assert_allclose(out[0], [0.5, 0.2, -0.3], atol=1e-5)
+    assert score[0] == 20
+
+
+def test_a_vote_against_physics_outweighs_a_vote_for() -> None:
+    """Two planes explain as many lit observations; the one that leaves darker ones loses."""
+    rng = np.random.default_rng(9)
+    A = rng.uniform(0.3, 1, (3, 16)).astype(f32)
+    low = np.array([0.2, 0.2, 0.2], f32) @ A
+    x = low.copy()
+    x[8:] = np.array([0.5, 0.4, 0.45], f32) @ A[:, 8:]
+    out, score = np.full((1, 3), np.nan, f32), np.zeros(1, np.int32)
+    args = (f32(0.01), f32(0.01), stopping_table(2000), 2000, np.uint64(1), out, score, 0, 1)
+    consensus_rows(x[:, None], np.arange(1), A, *args)
+    np.testing.assert_allclose(out[0], 0.2, atol=1e-4)
+    assert score[0] == 8
