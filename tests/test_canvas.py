@@ -115,10 +115,10 @@ def test_clicks_at_20_fold_land_on_their_pixel_up_to_its_edges(
     for row, column in expected:
         page.keyboard.press("f")
         page.mouse.move(*place_of(page, row + 0.5, column + 0.5))
-        for _ in range(7):
+        for _ in range(8):
             page.mouse.wheel(0, -600)
         wait_until(lambda: similarity(page)[0] >= 20)
-        for at in (0.06, 0.85):  # 0.94 of the last row lies below the window
+        for at in (0.06, 0.8):  # 0.94 of the last row lies below the window
             count = len(stage.picks)
             page.mouse.click(*place_of(page, row + at, column + at))
             wait_until(lambda count=count: len(stage.picks) > count)
