@@ -119,7 +119,8 @@ def start_coefficients(
     """
     bases = sample.images[list(triple)].copy()
     lit = ((bases >= thresholds.Ts) & (bases > 0)).all(axis=0)
-    unit = bases[:, lit] / np.linalg.norm(bases[:, lit], axis=0)
+    unit = bases[:, lit].astype(np.float64)
+    unit /= np.linalg.norm(unit, axis=0)
     spread = np.linalg.svd(unit, compute_uv=False)[-1] if lit.sum() >= 3 else 0
     T = min(max(3 * thresholds.T, 0.1), MAX_T)
     if spread <= min(thresholds.T, MAX_T / 3) / 10 * np.sqrt(lit.sum()):
