@@ -1,5 +1,6 @@
 """The web tool: one server, one session for each tab."""
 
+import warnings
 import webbrowser
 from threading import Lock
 
@@ -50,6 +51,8 @@ class App:
         session = Session(client, self._runs)
         with self._lock:
             self._sessions[client.client_id] = session
+        if client.client_id not in self.server.server.get_clients():  # left while it was built
+            self._detach(client)
 
     def _detach(self, client: viser.ClientHandle) -> None:
         with self._lock:
@@ -72,6 +75,8 @@ def serve(
     Raises:
         OptionError: the host or port cannot be used.
     """
+    # a tab may close while its worker draws; viser warns of every such message
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     app = App(stack, result, options=options, host=host, port=port)
     print(f"photolin: {stack.title} at {app.server.url} (Ctrl-C ends it)", flush=True)
     try:

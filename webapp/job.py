@@ -7,17 +7,24 @@ from threading import Event, Lock, Thread
 class Job:
     """Runs one piece of work; more that is asked for meanwhile is refused."""
 
-    def __init__(self, around: Callable[[Callable[[], None]], None]) -> None:
-        """`around(work)` is called in the thread, calls `work`, and must not raise."""
-        self._around = around
+    def __init__(
+        self, around: Callable[[Callable[[], None]], None], ended: Callable[[], None]
+    ) -> None:
+        """Tell how to run work.
+
+        Args:
+            around: called in the thread with the work; calls it and must not raise.
+            ended: called in the thread when the next piece can be started.
+        """
+        self._around, self._ended = around, ended
         self._lock = Lock()
         self._stop = Event()
-        self._running = False
+        self._running = self._closed = False
 
     def start(self, work: Callable[[], None]) -> bool:
         """Start `work` unless some is running; whether it was started."""
         with self._lock:
-            if self._running:
+            if self._running or self._closed:
                 return False
             self._running = True
             self._stop.clear()
@@ -28,12 +35,20 @@ class Job:
         """Ask what is running to stop."""
         self._stop.set()
 
+    def close(self) -> None:
+        """Ask what is running to stop, and start nothing any more."""
+        with self._lock:
+            self._closed = True
+            self._stop.set()
+
     def stopping(self) -> bool:
-        """Whether it has been asked to."""
+        """Whether what is running has been asked to stop."""
         return self._stop.is_set()
 
     def _run(self, work: Callable[[], None]) -> None:
         try:
             self._around(work)
         finally:
-            self._running = False
+            with self._lock:
+                self._running = False
+            self._ended()

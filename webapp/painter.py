@@ -39,7 +39,7 @@ class Painter:
             Whether the picture on screen is still a lossy one.
         """
         state = frame.state
-        look = (state.image, state.layer, state.gain, id(frame.analysis))
+        look = (state.image, state.layer, state.gain, frame.analysis)
         exact = frame.stack.mask.size <= LARGE or rested
         if self._is_new("picture", *look) or (exact and self._drawn.get("exact") != look):
             picture, self._caption = render_layer(frame)
@@ -58,7 +58,7 @@ class Painter:
         state = frame.state
         solid = state.layer == "labels"
         look = (state.shown, state.opacity, state.outlines, solid)
-        if not self._is_new("overlay", state.image, state.thresholds, id(frame.analysis), look):
+        if not self._is_new("overlay", state.image, state.thresholds, frame.analysis, look):
             return
         overlay = None
         if frame.labels is not None:

@@ -1,10 +1,12 @@
 """Analyses shared by all tabs: computed once for each set of options, one at a time."""
 
-from collections import OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
 from photolin.analysis import Analysis, Cancel, Options, Progress
+from photolin.errors import Cancelled
 from photolin.factors import Thresholds
 from photolin.kernels import consensus_rows
 from photolin.pipeline import analyze
@@ -14,6 +16,8 @@ from photolin.thresholds import suggest_thresholds
 
 KEPT = 8
 """Results kept for other tabs; a tab keeps its own for as long as it is open."""
+PATIENCE = 0.05
+"""Seconds between two looks at whether a tab still wants to wait for its turn."""
 
 
 class Runs:
@@ -24,31 +28,46 @@ class Runs:
         self.stack = stack
         self.options = options
         self.result = result
-        self._done: OrderedDict[Options, Analysis] = OrderedDict()
+        self._done: dict[Options, Analysis] = {}
         self._lock = Lock()
 
     def run(self, options: Options, progress: Progress, cancel: Cancel) -> Analysis:
         """The analysis by `options`: computed now, or by another tab before.
 
         Raises:
-            PhotolinError: as `analyze`.
+            PhotolinError: as `analyze`; Cancelled also while another tab computes.
         """
-        if not consensus_rows.signatures:
-            progress("compiling, once on this machine", 0.0)
-        with self._lock:
-            if options not in self._done:
-                self._done[options] = analyze(self.stack, options, progress=progress, cancel=cancel)
-            self._done.move_to_end(options)
-            while len(self._done) > KEPT:
-                self._done.popitem(last=False)
-            return self._done[options]
+        if (done := self._done.get(options)) is not None:
+            return done
+        with self._turn(progress, cancel):
+            if (done := self._done.get(options)) is None:
+                if not consensus_rows.signatures:
+                    progress("compiling, once on this machine", 0.0)
+                done = analyze(self.stack, options, progress=progress, cancel=cancel)
+                for oldest in list(self._done)[: len(self._done) + 1 - KEPT]:
+                    del self._done[oldest]
+                self._done[options] = done
+        return done
 
-    def suggest(self) -> Thresholds:
+    def suggest(self, cancel: Cancel) -> Thresholds:
         """Suggested T and Ts.
 
         Raises:
             DegenerateError: the images do not determine coefficients.
+            Cancelled: `cancel` returned true.
         """
         free = replace(self.options, T=None, Ts=None)
         sample = draw_sample(self.stack, free.seed)
-        return suggest_thresholds(sample, free, self.stack.lights).thresholds
+        return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
+
+    @contextmanager
+    def _turn(self, progress: Progress, cancel: Cancel) -> Iterator[None]:
+        """Wait until no other tab computes."""
+        while not self._lock.acquire(timeout=PATIENCE):
+            progress("waiting for another tab", 0.0)
+            if cancel():
+                raise Cancelled("the run was cancelled before it began")
+        try:
+            yield
+        finally:
+            self._lock.release()

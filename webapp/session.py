@@ -21,7 +21,7 @@ from photolin.factors import LETTERS, Thresholds
 
 from .canvas import Canvas, Pixel
 from .downloads import make_download, relabel
-from .frame import compose
+from .frame import Frame, compose
 from .job import Job
 from .painter import Painter
 from .runs import Runs
@@ -49,18 +49,19 @@ class Session:
         """Build the tab and start to work for it."""
         self._client, self._runs, self._stack = client, runs, runs.stack
         self._results: dict[Method, Analysis] = {}
-        self._declined: set[Method] = set()
+        self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
+        self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
         self._pixel: Pixel | None = None
         self._pointer: Pixel | None = None
-        thresholds = FIRST
+        T, Ts = runs.options.T, runs.options.Ts
+        self._first = Thresholds(FIRST.T if T is None else T, FIRST.Ts if Ts is None else Ts)
         if runs.result is not None:
             self._results[runs.result.options.method] = runs.result
-            thresholds = runs.result.thresholds
-        self._state = ViewState(method=runs.options.method, T=thresholds.T, Ts=thresholds.Ts)
+            self._first = runs.result.thresholds
         self._wake, self._closed = Event(), Event()
-        self._job = Job(self._guarded)
+        self._job = Job(self._guarded, self._wake.set)
         self._build(client)
         self._wake.set()
         Thread(target=self._work, name="tab", daemon=True).start()
@@ -68,7 +69,7 @@ class Session:
     def close(self) -> None:
         """Stop all work for the tab."""
         self._closed.set()
-        self._job.stop()
+        self._job.close()
         self._wake.set()
 
     def _build(self, client: viser.ClientHandle) -> None:
@@ -83,9 +84,9 @@ class Session:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self._picture = PictureView(gui, self._stack, changed, canvas.fit, canvas.one_to_one)
-            self._run = RunView(gui, self._state.method, changed, self._job.stop)
+            self._run = RunView(gui, self._runs.options.method, changed, self._job.stop)
             self._thresholds = ThresholdView(
-                gui, self._state.thresholds, changed, self._suggest, self._linearize_again
+                gui, self._first, changed, self._suggest, self._linearize_again
             )
             self._shares = SharesView(gui)
             self._pixel_view = PixelView(gui, changed)
@@ -96,7 +97,7 @@ class Session:
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self._picture, self._thresholds, self._pixel_view)
-        self._readers = (*both, self._run, self._legend)
+        self._readers = (self._run, *both, self._legend)
         self._drawers = (*both, self._shares, self._summary)
         self._keys = self._bind_keys()
         canvas.on_pick(self._pick)
@@ -127,8 +128,12 @@ class Session:
         }
 
     def _press(self, key: str) -> None:
-        if (action := self._keys.get(key.lower())) is not None:
+        if (action := self._keys.get(key.lower())) is None:
+            return
+        try:
             action()
+        except Exception as error:
+            self._report(error)
 
     def _pick(self, pixel: Pixel) -> None:
         self._pixel = pixel
@@ -139,14 +144,18 @@ class Session:
         self._wake.set()
 
     def _suggest(self) -> None:
-        self._job.start(self._set_suggested)
+        self._begin(self._set_suggested)
 
     def _linearize_again(self) -> None:
-        state = self._state
-        self._job.start(partial(self._linearize, state.method, state.thresholds))
+        state = self._read()
+        self._begin(partial(self._linearize, state.method, state.thresholds))
 
     def _download(self, kind: str, everything: bool) -> None:
-        self._job.start(partial(self._send, kind, everything))
+        self._begin(partial(self._send, self._read(), kind, everything))
+
+    def _begin(self, work: Callable[[], None]) -> None:
+        if not self._job.start(work):
+            self._notify("Still running", "wait until it ends, or cancel it, and try again", "gray")
 
     # --- long work ---
 
@@ -162,27 +171,25 @@ class Session:
             self._report(error)
         finally:
             self._run.busy(False)
-            self._wake.set()
 
     def _linearize(self, method: Method, thresholds: Thresholds | None) -> None:
         """Analyze by `method`; when None, with the thresholds asked for at first."""
         options = replace(self._runs.options, method=method)
         if thresholds is not None:
             options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
-        self._declined.add(method)
+        self._declined = frozenset((*self._declined, method))
         result = self._runs.run(options, self._run.progress, self._job.stopping)
-        self._declined.discard(method)
-        untouched = not self._results and self._state.thresholds == FIRST
+        self._declined = frozenset(m for m in self._declined if m != method)
+        untouched = not self._results and self._read().thresholds == self._first
         self._results = {**self._results, method: result}
         if untouched:
             self._thresholds.set(result.thresholds)
 
     def _set_suggested(self) -> None:
         self._run.progress("finding thresholds", 0.5)
-        self._thresholds.set(self._runs.suggest())
+        self._thresholds.set(self._runs.suggest(self._job.stopping))
 
-    def _send(self, kind: str, everything: bool) -> None:
-        state = self._state
+    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
         analysis = self._results.get(state.method)
         if analysis is None:
             raise OptionError("there is no result to export yet; linearize first")
@@ -206,20 +213,24 @@ class Session:
                 rough = False
                 self._report(error)
 
-    def _round(self, rested: bool) -> bool:
-        """Read all widgets and draw what differs; true when the picture is still rough."""
-        before, state = self._state, self._state
+    def _read(self) -> ViewState:
+        """The state that all widgets together stand for."""
+        state = ViewState(pixel=self._pixel)
         for view in self._readers:
             state = view.read(state)
-        self._state = state = replace(state, pixel=self._pixel)
-        results = self._results
+        return state
+
+    def _round(self, rested: bool) -> bool:
+        """Read all widgets and draw what differs; true when the picture is still rough."""
+        state, results, frame = self._read(), self._results, self._frame
         self._ensure_results(state, results)
-        frame = compose(self._stack, results, state)
+        if frame is not None and state == frame.state and results is self._shown_results:
+            return self._painter.paint(frame, self._pointer, rested=rested)
+        self._frame = frame = compose(self._stack, results, state)
+        self._shown_results = results
         rough = self._painter.paint(frame, self._pointer, rested=rested)
-        if state != before or results is not self._shown_results:
-            self._shown_results = results
-            for view in self._drawers:
-                view.draw(frame)
+        for view in self._drawers:
+            view.draw(frame)
         return rough
 
     def _ensure_results(self, state: ViewState, results: dict[Method, Analysis]) -> None:
@@ -238,5 +249,7 @@ class Session:
 
     def _report(self, error: Exception) -> None:
         """A fault of the program: a short note on screen, the trace in the terminal."""
+        if self._closed.is_set():
+            return
         traceback.print_exception(error)
         self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")

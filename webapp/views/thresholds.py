@@ -29,12 +29,11 @@ class ThresholdView:
         suggest: Callable[[], None],
         linearize: Callable[[], None],
     ) -> None:
-        self._fallback = initial
         self._T = gui.add_slider(
             "T",
             *RANGES["T"],
             STEP,
-            initial.T,
+            RANGES["T"][0],
             hint="Relative tolerance: an observation i counts as diffuse while |i - l| is at most "
             "T times i (keys: [ and ])",
         )
@@ -42,7 +41,7 @@ class ThresholdView:
             "Ts",
             *RANGES["Ts"],
             STEP,
-            initial.Ts,
+            RANGES["Ts"][0],
             hint="Shadow level, fraction of full scale: darker observations are shadow "
             "(keys: { and })",
         )
@@ -54,6 +53,7 @@ class ThresholdView:
             "(key: S). linearize again: T and Ts enter the linearization itself; until then only "
             "the labels follow the sliders (key: R)",
         )
+        self.set(initial)
         for handle in (self._T, self._Ts):
 
             @handle.on_update
@@ -67,27 +67,27 @@ class ThresholdView:
             actions[self._buttons.value]()
 
     def set(self, thresholds: Thresholds) -> None:
-        """Move both sliders."""
-        self._T.value, self._Ts.value = thresholds.T, thresholds.Ts
+        """Move both sliders, and widen them when they do not reach."""
+        self._fallback = thresholds
+        for handle, value in ((self._T, thresholds.T), (self._Ts, thresholds.Ts)):
+            handle.min, handle.max = min(handle.min, value), max(handle.max, value)
+            handle.value = value
 
     def nudge(self, T: int = 0, Ts: int = 0) -> None:
         """Move a slider by a tenth of its value, at least one step, `T` or `Ts` times."""
-        for handle, times, (low, high) in (
-            (self._T, T, RANGES["T"]),
-            (self._Ts, Ts, RANGES["Ts"]),
-        ):
+        for handle, times in ((self._T, T), (self._Ts, Ts)):
             if times:
                 steps = max(1, round(handle.value * (KEY_FACTOR - 1) / STEP))
                 value = round(handle.value / STEP) * STEP + times * steps * STEP
-                handle.value = round(min(max(value, low), high), 4)
+                handle.value = round(min(max(value, handle.min), handle.max), 4)
 
     def read(self, state: ViewState) -> ViewState:
         """The state with T and Ts as set here."""
-        return replace(
-            state,
-            T=clamp_number(self._T.value, *RANGES["T"], self._fallback.T),
-            Ts=clamp_number(self._Ts.value, *RANGES["Ts"], self._fallback.Ts),
+        T, Ts = (
+            clamp_number(handle.value, handle.min, handle.max, fallback)
+            for handle, fallback in ((self._T, self._fallback.T), (self._Ts, self._fallback.Ts))
         )
+        return replace(state, T=T, Ts=Ts)
 
     def draw(self, frame: Frame) -> None:
         """Say what the labels and what the bases were computed with."""

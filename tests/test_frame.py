@@ -1,0 +1,87 @@
+"""One view of a result: what is shown agrees with the backend, pixel by pixel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from photolin.analysis import Options
+from photolin.factors import OUTSIDE, Factor, Thresholds
+from photolin.label import label_images
+from photolin.pipeline import analyze
+from photolin.synthetic import render_scene
+from webapp.frame import compose, pixel_values
+from webapp.state import ViewState
+
+FULL = render_scene("sphere_cone", size=(24, 32), images=8).stack
+MASK = np.ones(FULL.mask.shape, bool)
+MASK[:3] = False
+STACK = replace(FULL, mask=MASK)
+ROBUST = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
+OTHER = analyze(STACK, Options(method="statistical", T=0.05, Ts=0.02, samples=50))
+RESULTS = {"robust": ROBUST, "statistical": OTHER}
+
+
+@pytest.mark.parametrize("thresholds", [Thresholds(0.05, 0.02), Thresholds(0.002, 0.3)])
+@pytest.mark.parametrize("image", [0, 7])
+def test_labels_are_the_backends_at_the_thresholds_of_the_view(
+    thresholds: Thresholds, image: int
+) -> None:
+    state = ViewState(image=image, T=thresholds.T, Ts=thresholds.Ts)
+    frame = compose(STACK, RESULTS, state)
+    expected = label_images(
+        STACK.images, ROBUST.linearized_bases, ROBUST.coefficients, STACK.mask, thresholds
+    )[image]
+    assert frame.analysis is ROBUST
+    assert frame.labels is not None
+    assert np.array_equal(frame.labels, expected)
+    assert (frame.labels[:3] == OUTSIDE).all()
+
+
+def test_the_thresholds_of_the_run_give_the_labels_of_the_run() -> None:
+    frame = compose(STACK, RESULTS, ViewState(image=3, T=0.05, Ts=0.02))
+    assert frame.labels is not None
+    assert np.array_equal(frame.labels, ROBUST.labels[3])
+
+
+@pytest.mark.parametrize("T", [0.001, 0.05, 0.15])
+def test_a_pixel_has_the_label_that_the_picture_shows(T: float) -> None:
+    state = ViewState(T=T, Ts=0.02)
+    shown = [compose(STACK, RESULTS, replace(state, image=k)).labels for k in range(8)]
+    maps = np.stack([labels for labels in shown if labels is not None])
+    rows, columns = np.nonzero(STACK.mask)
+    for row, column in zip(rows, columns, strict=True):
+        values = pixel_values(STACK, ROBUST, (row, column), state.thresholds)
+        assert np.array_equal(values.labels, maps[:, row, column])
+        assert np.array_equal(values.i, STACK.images[:, row, column])
+
+
+def test_linearized_values_of_a_pixel_are_those_of_the_images() -> None:
+    images = np.stack([ROBUST.linearized(k) for k in range(8)])
+    values = pixel_values(STACK, ROBUST, (20, 5), Thresholds(0.05, 0.02))
+    assert np.array_equal(values.l, images[:, 20, 5])
+
+
+def test_methods_are_shown_side_by_side_once_both_are_there() -> None:
+    state = ViewState(method="statistical", beside="robust")
+    frame = compose(STACK, RESULTS, state)
+    assert (frame.analysis, frame.beside) == (OTHER, ROBUST)
+    assert compose(STACK, {"statistical": OTHER}, state).beside is None
+    assert compose(STACK, RESULTS, replace(state, beside=None)).beside is None
+
+
+def test_without_a_result_there_are_no_labels() -> None:
+    frame = compose(STACK, {}, ViewState())
+    assert (frame.analysis, frame.beside, frame.labels) == (None, None, None)
+
+
+def test_an_undetermined_pixel_is_undefined_in_all_images() -> None:
+    bases = ROBUST.linearized_bases.copy()
+    bases[:, 9, 9] = np.nan
+    unknown = replace(ROBUST, linearized_bases=bases)
+    frame = compose(STACK, {"robust": unknown}, ViewState(image=2))
+    assert frame.labels is not None
+    assert frame.labels[9, 9] == Factor.UNDEFINED
+    values = pixel_values(STACK, unknown, (9, 9), Thresholds(0.05, 0.02))
+    assert np.isnan(values.l).all()
+    assert (values.labels == Factor.UNDEFINED).all()

@@ -1,0 +1,186 @@
+"""Painting: every part once for each change, lossless in the end, in the order asked for."""
+
+import io
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from photolin.analysis import Options
+from photolin.factors import PALETTE, Factor
+from photolin.pipeline import analyze
+from photolin.stack import ImageStack
+from photolin.synthetic import render_scene
+from webapp import painter as module
+from webapp.frame import Frame, compose
+from webapp.painter import Painter, describe, render_layer
+from webapp.state import ViewState
+
+STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
+RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
+
+
+@dataclass
+class FakeCanvas:
+    """Remembers what it was told."""
+
+    calls: list[tuple[str, Any]] = field(default_factory=list)
+    readout: str = ""
+
+    def set_base(self, encoded: bytes, image_format: str) -> None:
+        self.calls.append((f"base {image_format}", decode(encoded)))
+
+    def set_overlay(self, encoded: bytes | None) -> None:
+        self.calls.append(("overlay", None if encoded is None else decode(encoded)))
+
+    def set_marker(self, pixel: tuple[int, int] | None) -> None:
+        self.calls.append(("marker", pixel))
+
+    def set_readout(self, text: str) -> None:
+        self.readout = text
+
+    def take(self) -> dict[str, Any]:
+        """What was drawn since the last look, by part; no part twice."""
+        calls, self.calls = self.calls, []
+        assert len({name for name, _ in calls}) == len(calls)
+        return dict(calls)
+
+
+def decode(encoded: bytes) -> np.ndarray:
+    image = Image.open(io.BytesIO(encoded))
+    return np.asarray(image.convert("RGBA") if image.mode == "P" else image)
+
+
+def frame(stack: ImageStack = STACK, solved: bool = True, **state: Any) -> Frame:
+    return compose(stack, {"robust": RESULT} if solved else {}, ViewState(T=0.05, Ts=0.02, **state))
+
+
+@pytest.fixture
+def canvas() -> FakeCanvas:
+    return FakeCanvas()
+
+
+@pytest.fixture
+def painter(canvas: FakeCanvas) -> Painter:
+    return Painter(canvas)  # type: ignore[arg-type]
+
+
+def test_the_first_frame_draws_everything_and_the_same_again_nothing(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    assert painter.paint(frame(), None, rested=False) is False
+    assert set(canvas.take()) == {"base png", "overlay", "marker"}
+    assert painter.paint(frame(), None, rested=True) is False
+    assert canvas.take() == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        ({"image": 3}, {"base png", "overlay"}),
+        ({"T": 0.01}, {"overlay"}),
+        ({"Ts": 0.2}, {"overlay"}),
+        ({"opacity": 0.3}, {"overlay"}),
+        ({"outlines": True}, {"overlay"}),
+        ({"shown": frozenset({Factor.CAST})}, {"overlay"}),
+        ({"layer": "labels"}, {"base png", "overlay"}),
+        ({"layer": "residual"}, {"base png"}),
+        ({"gain": 2.0}, {"base png"}),
+        ({"pixel": (3, 4)}, {"marker"}),
+        ({"beside": "statistical"}, set()),
+    ],
+)
+def test_a_change_draws_the_parts_it_concerns(
+    painter: Painter, canvas: FakeCanvas, change: dict[str, Any], parts: set[str]
+) -> None:
+    first = frame()
+    painter.paint(first, None, rested=False)
+    canvas.take()
+    state = replace(first.state, **change)
+    painter.paint(compose(STACK, {"robust": RESULT}, state), None, rested=False)
+    assert set(canvas.take()) == parts
+
+
+def test_a_new_result_is_drawn_though_nothing_else_changed(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    painter.paint(frame(solved=False), None, rested=False)
+    assert canvas.take()["overlay"] is None
+    painter.paint(frame(), None, rested=False)
+    assert canvas.take()["overlay"] is not None
+    other = replace(RESULT, coefficients=RESULT.coefficients[::-1].copy())
+    painter.paint(compose(STACK, {"robust": other}, frame().state), None, rested=False)
+    assert "overlay" in canvas.take()
+
+
+def test_the_label_layer_has_exactly_the_colours_of_the_labels(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    shown = frame(layer="labels", opacity=0.2, image=5)
+    painter.paint(shown, None, rested=False)
+    overlay = canvas.take()["overlay"]
+    colours = np.zeros((256, 3), np.uint8)
+    for factor, colour in PALETTE.items():
+        colours[factor] = colour
+    assert (overlay[..., 3] == 255).all()
+    assert np.array_equal(overlay[..., :3], colours[shown.labels])
+
+
+def test_a_large_picture_goes_out_rough_at_first_and_exact_once_at_rest(
+    painter: Painter, canvas: FakeCanvas, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LARGE", 100)
+    assert painter.paint(frame(), None, rested=False) is True
+    assert "base jpeg" in canvas.take()
+    assert painter.paint(frame(), (2, 3), rested=False) is True
+    assert canvas.take() == {}
+    assert painter.paint(frame(), None, rested=True) is False
+    exact = canvas.take()
+    assert set(exact) == {"base png"}
+    assert np.array_equal(exact["base png"], render_layer(frame())[0])
+    assert painter.paint(frame(), None, rested=True) is False
+    assert canvas.take() == {}
+    assert painter.paint(frame(image=1), None, rested=False) is True
+    assert painter.paint(frame(image=0), None, rested=False) is True
+
+
+def test_the_readout_says_the_scale_or_the_pixel_under_the_pointer(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    painter.paint(frame(gain=2.5), None, rested=False)
+    assert canvas.readout == "input, shown 2.5 times brighter"
+    painter.paint(frame(layer="linearized"), None, rested=False)
+    assert canvas.readout.startswith("linearized, black -")
+    assert canvas.readout.endswith("of full scale, zero mid-grey")
+    painter.paint(frame(layer="linearized"), (2, 3), rested=False)
+    assert canvas.readout.startswith("row 2  column 3  i ")
+    painter.paint(frame(layer="linearized"), None, rested=False)
+    assert canvas.readout.startswith("linearized, black -")
+
+
+def test_layers_show_zero_as_mid_grey_or_white() -> None:
+    linearized, text = render_layer(frame(layer="linearized"))
+    zero = RESULT.linearized(0) == 0
+    assert np.array_equal(linearized[zero], np.full(zero.sum(), 128))
+    assert ((linearized < 128) <= (RESULT.linearized(0) < 0)).all()
+    assert "zero mid-grey" in text
+    residual, text = render_layer(frame(layer="residual"))
+    exact = STACK.images[0] == RESULT.linearized(0)
+    assert exact.any()
+    assert (residual[exact] == 255).all()
+    assert "zero white" in text
+
+
+def test_layers_that_need_a_result_show_the_input_until_there_is_one() -> None:
+    shown = [render_layer(frame(solved=False, layer=layer))[0] for layer in ("input", "residual")]
+    assert np.array_equal(*shown)
+    assert describe(frame(solved=False), (1, 2)).startswith("row 1  column 2  i ")
+
+
+def test_the_pointer_outside_the_mask_reads_the_input_alone() -> None:
+    mask = np.ones(STACK.mask.shape, bool)
+    mask[0] = False
+    stack = replace(STACK, mask=mask)
+    assert describe(frame(stack), (0, 5)).endswith("outside the mask")
