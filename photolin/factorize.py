@@ -1,9 +1,10 @@
-"""Coefficients of all images at once, by alternation: step 1 of `robust`.
+"""Rough coefficients of all images at once, by alternation: step 1 of `robust`.
 
 Base images with wide highlights or a dominant plane give poor coefficients, whatever is done with
 them. So they only give a start: bases are linearized with those coefficients, coefficients are
 estimated again from the linearized bases, and so on while T is annealed down. The support over
-all sampled pixels and images decides between starts from different base images.
+all sampled pixels and images decides between starts from different base images. `refine` goes on
+from there.
 """
 
 from collections.abc import Sequence
@@ -19,8 +20,7 @@ from .factors import Thresholds
 from .sample import Sample
 
 COARSE = (6.0, 4.0, 3.0)
-FINE = (2.0, 1.5, 1.0, 1.0, 0.7, 0.5, 0.5)
-"""T during alternation, in units of T; below 1 highlight tails leave the fit."""
+"""T during alternation, in units of T."""
 MAX_T = 0.3
 ROUGH_PIXELS = 1000
 MIN_SCORE = 4
@@ -43,6 +43,8 @@ class Factorization:
     """(3,M) of the sampled pixels; NaN where lit in fewer than three images."""
     score: int
     """D - U over all sampled pixels and images."""
+    noise: float = 0.0
+    """Standard deviation of (i - l)/i below the fit, where it was measured."""
 
 
 def search_coefficients(
@@ -83,26 +85,6 @@ def search_coefficients(
     if not found:
         raise DegenerateError(NO_START)
     return max(found, key=lambda f: f.score).coefficients
-
-
-def refine_coefficients(
-    sample: Sample,
-    coefficients: NDArray[np.float64],
-    thresholds: Thresholds,
-    seed: int,
-    limit: int,
-    cancel: Cancel | None = None,
-) -> Factorization:
-    """The factorization that alternation reaches from rough coefficients (K,3).
-
-    Raises:
-        DegenerateError: it lost a dimension on the way.
-        Cancelled: `cancel` said so.
-    """
-    found = alternate(sample, coefficients, thresholds, FINE, seed, limit, cancel)
-    if found is None:
-        raise DegenerateError(NO_START)
-    return found
 
 
 def start_coefficients(

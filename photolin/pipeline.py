@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
 from .errors import DegenerateError, OptionError
-from .factorize import refine_coefficients, search_coefficients
+from .factorize import search_coefficients
 from .label import label_images
 from .linearize import linearize
+from .refine import refine_coefficients
 from .sample import Sample, draw_sample
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
@@ -113,12 +114,12 @@ def check_base_images(options: Options, stack: ImageStack) -> None:
 def robust_coefficients(
     sample: Sample, suggestion: Suggestion, options: Options, cancel: Cancel | None
 ) -> NDArray[np.float64]:
-    """(K,3) by alternation on the sample, from where suggesting T has come already."""
+    """(K,3) on the sample; suggesting T has found them already."""
+    if suggestion.coefficients is not None:
+        return suggestion.coefficients
     t, seed, limit = suggestion.thresholds, options.seed, options.samples
-    rough = suggestion.coefficients
-    if rough is None:
-        rough = search_coefficients(sample, suggestion.starts, t, seed, limit, cancel)
-    return refine_coefficients(sample, rough, t, seed, limit, cancel).coefficients
+    rough = search_coefficients(sample, suggestion.starts, t, seed, limit, cancel)
+    return refine_coefficients(sample, rough, t.T, t.Ts, seed, limit, cancel).coefficients
 
 
 def relate_to_bases(

@@ -11,13 +11,12 @@ from .factorize import (
     Factorization,
     fit_bases,
     orthogonalize,
-    refine_coefficients,
     search_coefficients,
 )
 from .factors import Thresholds
+from .refine import follow_noise, lower_noise, refine_coefficients
 from .sample import Sample
 
-MIN_T, MAX_T = 0.008, 0.12
 FIRST_T = 0.05
 LEVELS = 256
 """Histogram bins from black to the brightest grays when looking for the shadow level."""
@@ -44,7 +43,7 @@ class Suggestion:
     starts: tuple[tuple[int, int, int], ...]
     """Choices of base images, best first."""
     coefficients: NDArray[np.float64] | None
-    """(K,3) of the provisional linearization; None where none was needed."""
+    """(K,3) of the provisional linearization; None where T was given."""
 
 
 def suggest_thresholds(
@@ -57,7 +56,7 @@ def suggest_thresholds(
 
     Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T is
     three times the noise seen on the negative side (i < l) of D residuals, where highlights cannot
-    be, after two provisional linearizations.
+    be, after a provisional linearization.
 
     Args:
         lights: (K,3) where known; coefficients are then not estimated.
@@ -66,21 +65,17 @@ def suggest_thresholds(
         DegenerateError: the images do not determine coefficients.
     """
     histogram, bin_width = dark_histogram(sample.images)
-    Ts = bin_width * shadow_bins(histogram) if options.Ts is None else options.Ts
+    Ts = options.Ts if options.Ts is not None else round(bin_width * shadow_bins(histogram), 4)
     starts = find_starts(sample, Ts, options, lights)
-    noise, T, found = 0.0, FIRST_T if options.T is None else options.T, None
-    for _ in range(2 if options.T is None else 0):
-        now = Thresholds(T, Ts)
-        found = provisional(sample, starts, now, options, lights, found, cancel)
-        noise = lower_noise(sample.images, found.coefficients, found.bases, now)
-        T = float(np.clip(3 * noise, MIN_T, MAX_T))
-    T = round(T, 4) if options.T is None else T
-    Ts = round(Ts, 4) if options.Ts is None else Ts
+    T, found = options.T, None
+    if T is None:
+        found = provisional(sample, starts, Ts, options, lights, cancel)
+        T = round(follow_noise(found.noise), 4)
     return Suggestion(
         Thresholds(T, Ts),
         histogram,
         bin_width,
-        noise,
+        0.0 if found is None else found.noise,
         tuple(starts),
         None if found is None else found.coefficients,
     )
@@ -89,23 +84,25 @@ def suggest_thresholds(
 def provisional(
     sample: Sample,
     starts: list[tuple[int, int, int]],
-    thresholds: Thresholds,
+    Ts: float,
     options: Options,
     lights: NDArray[np.float64] | None,
-    last: Factorization | None,
     cancel: Cancel | None,
 ) -> Factorization:
-    """A factorization good enough to read the noise off, from the last one where there is one."""
+    """A factorization with the noise that shows in it."""
     seed, limit = options.seed, options.samples
-    if lights is not None:
-        c = orthogonalize(lights)
-        bases, _ = fit_bases(sample, c, thresholds.T, thresholds.Ts, seed, limit)
-        return Factorization(c, bases, 0)
-    if last is None:
-        rough = search_coefficients(sample, starts, thresholds, seed, limit, cancel)
-    else:
-        rough = last.coefficients
-    return refine_coefficients(sample, rough, thresholds, seed, limit, cancel)
+    if lights is None:
+        first = Thresholds(FIRST_T, Ts)
+        rough = search_coefficients(sample, starts, first, seed, limit, cancel)
+        return refine_coefficients(sample, rough, None, Ts, seed, limit, cancel)
+    c = orthogonalize(lights)
+
+    def at(T: float) -> Factorization:
+        bases, score = fit_bases(sample, c, T, Ts, seed, limit)
+        noise = lower_noise(sample.images, c, bases, T, Ts)
+        return Factorization(c, bases, int(score[score > 0].sum()), noise)
+
+    return at(follow_noise(at(FIRST_T).noise))
 
 
 def find_starts(
@@ -139,20 +136,3 @@ def shadow_bins(histogram: NDArray[np.float64]) -> int:
         return FLOOR
     above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
     return peak + int(above[0]) + 1 if above.size else CEILING
-
-
-def lower_noise(
-    images: NDArray[np.float32],
-    coefficients: NDArray[np.float64],
-    bases: NDArray[np.float32],
-    thresholds: Thresholds,
-) -> float:
-    """Standard deviation of (i - l)/i among D observations with i < l."""
-    l = coefficients.astype(np.float32) @ bases
-    with np.errstate(invalid="ignore", divide="ignore"):
-        short = (l - images) / images
-    short = short[(images >= thresholds.Ts) & (short > 0) & (short <= thresholds.T)]
-    if len(short) == 0:
-        return 0.0
-    # the median of a half-normal is 0.6745 standard deviations
-    return float(np.median(short) / 0.6745)

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors", "factors", "stack", "analysis", "kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
-    ("bases", "factorize", "coefficients", "linearize", "label", "thresholds"),
+    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds"),
     ("shape", "evaluate", "paper"),
     ("pipeline",),
     ("export",),

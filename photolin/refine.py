@@ -1,0 +1,157 @@
+"""Coefficients to the last digit: weighted factorization of the observations that are diffuse.
+
+Alternation (`factorize`) zigzags towards the best coefficients and stops far from them, because
+bases fitted to noisy coefficients pull the coefficients back. Eliminating the bases instead (each
+pixel's own are a linear least-squares problem) leaves one problem in the coefficients of all images
+together, solved by Gauss-Newton steps: Wiberg, "Computation of principal components when data are
+missing", COMPSTAT 1976; Okatani and Deguchi, IJCV 72(3), 2007.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel
+from .errors import Cancelled, DegenerateError
+from .factorize import MIN_SCORE, NO_START, Factorization, fit_bases, orthogonalize
+from .sample import Sample
+
+T_PER_NOISE = 3.0
+MIN_T, MAX_T = 0.008, 0.12
+FIRST_T = 0.1
+FIRST_WIDTH = 0.03
+LAST_WIDTH = 5e-4
+"""Below this, residuals of noise-free 16-bit images are rounding."""
+ROUNDS = 12
+STILL = 2e-5
+"""Change of the coefficients in one round, relative to their length, that ends the rounds."""
+DAMPING = 1e-6
+
+
+def refine_coefficients(
+    sample: Sample,
+    coefficients: NDArray[np.float64],
+    T: float | None,
+    Ts: float,
+    seed: int,
+    limit: int,
+    cancel: Cancel | None = None,
+) -> Factorization:
+    """The factorization that best explains the diffuse observations, from rough coefficients.
+
+    Each round fits bases by consensus, weighs D observations by their residual (a Gaussian whose
+    width is annealed down to the noise, so that highlight tails lose their say), and takes a
+    Gauss-Newton step in all coefficients.
+
+    Args:
+        coefficients: (K,3)
+        T: relative tolerance; None: follows the noise that is found.
+
+    Raises:
+        DegenerateError: the observations do not determine coefficients.
+        Cancelled: `cancel` said so.
+    """
+    c, noise = orthogonalize(coefficients), FIRST_T / T_PER_NOISE
+    bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
+    for round_ in range(ROUNDS):
+        if cancel is not None and cancel():
+            raise Cancelled("coefficients was cancelled")
+        annealed = FIRST_T * 0.5**round_
+        tolerance = max(T if T is not None else follow_noise(noise), annealed)
+        bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
+        noise = lower_noise(sample.images, c, bases, tolerance, Ts)
+        width = max(2 * noise, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
+        weights = weigh(sample, c, bases, score, tolerance, Ts, width)
+        before, c = c, gauss_newton_step(sample.pixels, weights, c)
+        if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
+            raise DegenerateError(NO_START)
+        c = orthogonalize(c)
+        # annealing goes on while it still changes the width, however little the coefficients move
+        if change_of_span(before, c) < STILL and width <= max(2 * noise, LAST_WIDTH):
+            break
+    return Factorization(c, bases, int(score[score > 0].sum()), noise)
+
+
+def follow_noise(noise: float) -> float:
+    """T for a relative noise (standard deviation of (i - l)/i)."""
+    return float(np.clip(T_PER_NOISE * noise, MIN_T, MAX_T))
+
+
+def lower_noise(
+    images: NDArray[np.float32],
+    coefficients: NDArray[np.float64],
+    bases: NDArray[np.float32],
+    T: float,
+    Ts: float,
+) -> float:
+    """Standard deviation of (i - l)/i among D observations with i < l, where no highlight can be.
+
+    Args:
+        images: (K,M)
+        coefficients: (K,3)
+        bases: (3,M), NaN where unknown.
+    """
+    l = coefficients.astype(np.float32) @ bases
+    with np.errstate(invalid="ignore", divide="ignore"):
+        short = (l - images) / images
+    short = short[(images >= Ts) & (short > 0) & (short <= T)]
+    # the median of a half-normal is 0.6745 standard deviations
+    return float(np.median(short) / 0.6745) if short.size else 0.0
+
+
+def weigh(
+    sample: Sample,
+    coefficients: NDArray[np.float64],
+    bases: NDArray[np.float32],
+    score: NDArray[np.int32],
+    T: float,
+    Ts: float,
+    width: float,
+) -> NDArray[np.float64]:
+    """(M,K) weights of the observations: Gaussian in (i - l)/i for D, 0 for all others."""
+    i = sample.pixels
+    l = (coefficients.astype(np.float32) @ bases).T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        residual = (i - l) / i
+        diffuse = (i >= Ts) & (np.abs(residual) <= T) & (score >= MIN_SCORE)[:, None]
+    return np.where(diffuse, np.exp(-0.5 * (np.where(diffuse, residual, 0) / width) ** 2), 0.0)
+
+
+def gauss_newton_step(
+    X: NDArray[np.float32], W: NDArray[np.float64], c: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Coefficients after one step towards the least sum of W (X - b c)^2 with the best b.
+
+    Args:
+        X: (M,K) observations, a row for each pixel.
+        W: (M,K) weights, 0 leaves an observation out.
+        c: (K,3) coefficients.
+    """
+    K = len(c)
+    gram = (W @ (c[:, :, None] * c[:, None, :]).reshape(K, 9)).reshape(-1, 3, 3)
+    size = np.prod(np.diagonal(gram, axis1=1, axis2=2), axis=1)
+    known = np.linalg.det(gram) > 1e-6 * size
+    inverse = np.linalg.inv(gram[known])
+    x, w = X[known].astype(np.float64), W[known]
+    b = (inverse @ ((w * x) @ c)[:, :, None])[:, :, 0]
+    gradient = (w * (x - b @ c.T)).T @ b
+    # b follows c: what a change of c moves within the span of c does not count
+    spanned = w[:, :, None] * (c @ np.linalg.cholesky(inverse))
+    spanned = spanned.transpose(0, 2, 1).reshape(-1, K)
+    hessian = np.empty((K, 3, K, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            both = b[:, i] * b[:, j]
+            block = np.diag(both @ w) - spanned.T @ (np.repeat(both, 3)[:, None] * spanned)
+            hessian[:, i, :, j] = block
+            hessian[:, j, :, i] = block.T
+    hessian = hessian.reshape(3 * K, 3 * K)
+    # any 3x3 map of c fits as well: damping keeps those nine directions still
+    hessian[np.diag_indices(3 * K)] += DAMPING * np.trace(hessian) / (3 * K)
+    return c + np.linalg.solve(hessian, gradient.ravel()).reshape(K, 3)
+
+
+def change_of_span(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Distance of two column spaces, given by orthogonal columns of one length; 0 to 1."""
+    length = np.linalg.norm(a[:, 0])
+    outside = b / length - a @ (a.T @ b) / length**3
+    return float(np.linalg.norm(outside) / np.sqrt(3))
