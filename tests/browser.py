@@ -32,10 +32,13 @@ def similarity(page: Any) -> tuple[float, float, float]:
     rest = """() => new Promise((done) => {
         let last = "", still = 0;
         const look = () => {
+            const { camera, cameraControl } = window.__viserMutable ?? {};
+            const goal = cameraControl?.getPosition(camera.position.clone(), true);
+            const moving = !goal || goal.distanceTo(camera.position) > 1e-6 * goal.length();
             const now = JSON.stringify(window.photolin?.similarity() ?? null);
-            still = now === last && now !== "null" ? still + 1 : 0;
+            still = now === last && now !== "null" && !moving ? still + 1 : 0;
             last = now;
-            still > 4 ? done(JSON.parse(now)) : setTimeout(look, 40);
+            still > 2 ? done(JSON.parse(now)) : setTimeout(look, 40);
         };
         look();
     })"""
