@@ -183,12 +183,11 @@ def _read_pnm(data: bytes, where: str) -> Picture:
 def _read_with_imageio(srgb: bool, why: str) -> Callable[[bytes, str], Picture]:
     def read(data: bytes, where: str) -> Picture:
         # Rotation tags are left aside: the pixels of a fixed camera are registered as stored.
-        with iio.imopen(BytesIO(data), "r", plugin="pillow") as file:
-            rows, columns = file.properties(index=0).shape[:2]
-            check_size(rows, columns, where)
-            plain = file.metadata()["mode"] in ("L", "LA", "RGB", "RGBA")
-            pixels = file.read(index=0, mode=None if plain else "RGB")
-            return as_picture(pixels, where, srgb=srgb, why=why)
+        rows, columns = iio.improps(BytesIO(data), plugin="pillow").shape[:2]
+        check_size(rows, columns, where)
+        plain = iio.immeta(BytesIO(data), plugin="pillow")["mode"] in ("L", "LA", "RGB", "RGBA")
+        pixels = iio.imread(BytesIO(data), plugin="pillow", mode=None if plain else "RGB")
+        return as_picture(pixels, where, srgb=srgb, why=why)
 
     return read
 
