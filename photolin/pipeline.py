@@ -146,7 +146,7 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     notes = []
     if options.T is None:
         notes.append(
-            f"T = {t.T:g} suggested: three times the noise below the fit, {suggestion.noise:.4f}"
+            f"T = {t.T:g} suggested: from the noise below the fit, {suggestion.noise:.4f} of i"
         )
     if options.Ts is None:
         notes.append(f"Ts = {t.Ts:g} suggested: the upper end of the shadows' gray levels")

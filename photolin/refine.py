@@ -15,9 +15,12 @@ from .errors import Cancelled, DegenerateError
 from .factorize import MIN_SCORE, NO_START, Factorization, fit_bases, orthogonalize
 from .sample import Sample
 
-T_PER_NOISE = 3.0
+T_PER_NOISE = 1.8
+"""Trades diffuse pixels lost to noise against highlights lost to T: the best mean of both."""
 MIN_T, MAX_T = 0.008, 0.12
 FIRST_T = 0.1
+CUT = 3.0
+"""Residual, in units of the noise, beyond which an observation is no longer diffuse in the fit."""
 FIRST_WIDTH = 0.03
 LAST_WIDTH = 5e-4
 """Below this, residuals of noise-free 16-bit images are rounding."""
@@ -50,13 +53,13 @@ def refine_coefficients(
         DegenerateError: the observations do not determine coefficients.
         Cancelled: `cancel` said so.
     """
-    c, noise = orthogonalize(coefficients), FIRST_T / T_PER_NOISE
+    c, noise = orthogonalize(coefficients), FIRST_T / CUT
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
     for round_ in range(ROUNDS):
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
-        annealed = FIRST_T * 0.5**round_
-        tolerance = max(T if T is not None else follow_noise(noise), annealed)
+        wanted = max(CUT * noise, MIN_T) if T is None else T
+        tolerance = max(min(wanted, FIRST_T), FIRST_T * 0.5**round_)
         bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
         noise = lower_noise(sample.images, c, bases, tolerance, Ts)
         width = max(2 * noise, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)

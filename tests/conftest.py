@@ -1,8 +1,10 @@
 """A real browser for the tests marked `browser`, and an address that nobody else may use."""
 
+import importlib
+import os
 import shutil
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -24,14 +26,24 @@ CHROMIUM_FLAGS = (
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """Chromium with software WebGL and an empty profile."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    try:
+        playwright = importlib.import_module("playwright.sync_api")
+    except ImportError:
+        _leave_out("playwright is not installed")
     found = [path for name in CHROMIUM_NAMES if (path := shutil.which(name))]
     if not found:
-        pytest.skip("no Chromium on PATH (Debian: apt install chromium)")
+        _leave_out("no Chromium on PATH (Debian: apt install chromium)")
     with playwright.sync_playwright() as started:
         chromium = started.chromium.launch(executable_path=found[0], args=[*CHROMIUM_FLAGS])
         yield chromium
         chromium.close()
+
+
+def _leave_out(why: str) -> NoReturn:
+    """Skip, or fail where PHOTOLIN_REQUIRE_BROWSER asks for a browser."""
+    if os.environ.get("PHOTOLIN_REQUIRE_BROWSER"):
+        pytest.fail(f"{why}, and PHOTOLIN_REQUIRE_BROWSER is set")
+    pytest.skip(why)
 
 
 @pytest.fixture
