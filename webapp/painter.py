@@ -27,6 +27,7 @@ class Painter:
         self._canvas = canvas
         self._drawn: dict[str, object] = {}
         self._caption = ""
+        self._rough = False
 
     def paint(self, frame: Frame, pointer: Pixel | None, *, rested: bool) -> bool:
         """Show a frame.
@@ -41,18 +42,18 @@ class Painter:
         state = frame.state
         look = (state.image, state.layer, state.gain, frame.analysis)
         exact = frame.stack.mask.size <= LARGE or rested
-        if self._is_new("picture", *look) or (exact and self._drawn.get("exact") != look):
+        if self._is_new("picture", *look) or (exact and self._rough):
             picture, self._caption = render_layer(frame)
             if exact:
                 self._canvas.set_base(encode_png(picture), "png")
-                self._drawn["exact"] = look
             else:
                 self._canvas.set_base(encode_jpeg(picture), "jpeg")
+            self._rough = not exact
         self._paint_overlay(frame)
         if self._is_new("marker", state.pixel):
             self._canvas.set_marker(state.pixel)
         self._canvas.set_readout(self._caption if pointer is None else describe(frame, pointer))
-        return self._drawn.get("exact") != look
+        return self._rough
 
     def _paint_overlay(self, frame: Frame) -> None:
         state = frame.state
