@@ -64,6 +64,8 @@ def refine_coefficients(
         noise = lower_noise(sample.images, c, bases, tolerance, Ts)
         width = max(2 * noise, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
         weights = weigh(sample, c, bases, score, tolerance, Ts, width)
+        if not weights.any():
+            raise DegenerateError(NO_START)
         before, c = c, gauss_newton_step(sample.pixels, weights, c)
         if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
             raise DegenerateError(NO_START)
