@@ -1,0 +1,110 @@
+"""Weighted factorization: its step against finite differences, the noise it reads, refusals."""
+
+import numpy as np
+import pytest
+from lambert import lambertian, wrap
+
+from photolin.errors import DegenerateError
+from photolin.evaluate import light_error
+from photolin.factorize import orthogonalize
+from photolin.refine import (
+    MAX_T,
+    MIN_T,
+    T_PER_NOISE,
+    change_of_span,
+    follow_noise,
+    gauss_newton_step,
+    lower_noise,
+    refine_coefficients,
+)
+from photolin.sample import draw_sample
+
+
+def problem() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Noisy observations X (M,K), weights W (M,K) with zeros, coefficients (K,3)."""
+    rng = np.random.default_rng(0)
+    c = rng.normal(size=(9, 3))
+    X = (rng.normal(size=(200, 3)) @ c.T + rng.normal(0, 0.05, (200, 9))).astype(np.float32)
+    W = rng.random((200, 9)) * (rng.random((200, 9)) > 0.3)
+    return X, W, orthogonalize(c + rng.normal(0, 0.05, c.shape))
+
+
+def loss(X: np.ndarray, W: np.ndarray, c: np.ndarray) -> float:
+    """Sum of W (X - b c)^2 with the best b of every pixel, by lstsq."""
+    total = 0.0
+    for x, w in zip(X, np.sqrt(W), strict=True):
+        if np.count_nonzero(w) >= 3:
+            b = np.linalg.lstsq(w[:, None] * c, w * x)[0]
+            total += float(np.sum((w * x - w * (c @ b)) ** 2))
+    return total
+
+
+def test_steps_end_where_no_small_change_lowers_the_loss() -> None:
+    X, W, c = problem()
+    losses = [loss(X, W, c)]
+    for _ in range(6):
+        c = orthogonalize(gauss_newton_step(X, W, c))
+        losses.append(loss(X, W, c))
+    assert losses[1] < losses[0]
+    assert losses[-2] - losses[-1] < 1e-6 * losses[-1]
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        way = rng.normal(size=c.shape) * 1e-3
+        up, down = loss(X, W, c + way), loss(X, W, c - way)
+        assert min(up, down) > losses[-1]
+        assert abs(up - down) < 0.05 * (up + down - 2 * losses[-1])
+
+
+def test_the_change_of_a_span_is_zero_for_the_same_and_one_for_another() -> None:
+    c = orthogonalize(np.random.default_rng(0).normal(size=(9, 3)))
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    assert change_of_span(c, c @ turn) == pytest.approx(0, abs=1e-12)
+    other = np.linalg.qr(c, mode="complete")[0][:, 3:6] * np.linalg.norm(c[:, 0])
+    assert change_of_span(c, other) == pytest.approx(1)
+
+
+def test_noisy_diffuse_images_are_solved_as_well_as_their_noise_allows() -> None:
+    stack, lights = lambertian(14)
+    noisy = stack.images * np.random.default_rng(0).normal(1, 0.01, stack.shape)
+    start = lights + np.random.default_rng(1).normal(0, 0.03, lights.shape)
+    sample = draw_sample(wrap(np.clip(noisy, 0, 1)), 0)
+    found = refine_coefficients(sample, start, None, 0.01, 0, 500)
+    assert found.noise == pytest.approx(0.01, rel=0.2)
+    assert light_error(start, lights) > 1
+    assert light_error(found.coefficients, lights) < 0.2
+
+
+def test_the_tolerance_is_in_proportion_to_the_noise_within_bounds() -> None:
+    assert follow_noise(0.02) == pytest.approx(T_PER_NOISE * 0.02)
+    assert (follow_noise(0), follow_noise(1)) == (MIN_T, MAX_T)
+
+
+def test_noise_is_read_below_the_fit_only_and_from_lit_pixels() -> None:
+    rng = np.random.default_rng(0)
+    l = np.full((1, 100_000), 0.5)
+    i = l * (1 + rng.normal(0, 0.01, l.shape))
+    i[:, :40_000] += 0.2  # highlights
+    i[:, 40_000:50_000] = 0.001  # shadows
+    bases = np.concatenate([l, np.zeros((2, l.size))]).astype(np.float32)
+    noise = lower_noise(i.astype(np.float32), np.array([[1.0, 0, 0]]), bases, 0.1, 0.02)
+    assert noise == pytest.approx(0.01, rel=0.05)
+
+
+def test_where_nothing_is_below_the_fit_there_is_no_noise() -> None:
+    nothing = np.zeros((3, 5), np.float32)
+    assert lower_noise(nothing, np.eye(3), nothing, 0.1, 0.0) == 0
+    unknown = np.full((3, 5), np.nan, np.float32)
+    assert lower_noise(nothing + 1, np.eye(3), unknown, 0.1, 0.0) == 0
+
+
+@pytest.mark.parametrize("T", [None, 0.02])
+def test_observations_that_determine_nothing_are_refused(T: float | None) -> None:
+    """Each pixel is lit in three images: any coefficients fit."""
+    stack, lights = lambertian(8)
+    images = stack.images.reshape(8, -1).copy()
+    rng = np.random.default_rng(0)
+    for pixel in images.T:
+        pixel[rng.permutation(8)[3:]] = 0
+    sample = draw_sample(wrap(images.reshape(stack.shape)), 0)
+    with pytest.raises(DegenerateError, match="no base images explain the others"):
+        refine_coefficients(sample, lights, T, 0.01, 0, 500)
