@@ -62,9 +62,9 @@ def test_neither_threads_nor_block_size_change_a_bit(
 def test_highlights_and_shadows_are_seen_through_and_negatives_kept() -> None:
     rng = np.random.default_rng(0)
     stack, lights = lambertian(14)
-    lights[0] = (-1.5, 0, 0.3)  # grazing: part of the relief faces away
+    lights[1] = (-1.5, 0, 0.3)  # a grazing base image: part of the relief faces away
     ideal = stack.images.reshape(14, -1)
-    v = np.linalg.lstsq(lights[1:], ideal[1:].astype(float))[0]
+    v = np.linalg.lstsq(lights[2:], ideal[2:].astype(float))[0]
     ideal = (lights @ v).astype(np.float32)
     images = np.maximum(ideal, 0)
     images[(rng.random(images.shape) < 0.15) & (images > 0)] += 0.1
