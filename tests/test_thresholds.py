@@ -68,7 +68,7 @@ def test_what_is_given_is_kept() -> None:
 
 
 def test_the_suggestion_is_the_same_for_the_same_seed() -> None:
-    stack = render_scene("pot", noise=0.01, bits=8).stack
+    stack = render_scene("pot", size=(48, 48), noise=0.01, bits=8).stack
     assert suggest(stack).thresholds == suggest(stack).thresholds
 
 
