@@ -84,14 +84,16 @@ class Session:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self._picture = PictureView(gui, self._stack, changed, canvas.fit, canvas.one_to_one)
-            self._run = RunView(gui, self._runs.options.method, changed, self._job.stop)
             self._thresholds = ThresholdView(
                 gui, self._first, changed, self._suggest, self._linearize_again
             )
+            self._run = RunView(gui, self._runs.options.method, changed, self._job.stop)
             self._shares = SharesView(gui)
             self._pixel_view = PixelView(gui, changed)
-            self._legend = LegendView(gui, self._stack, changed)
-            self._summary = SummaryView(gui)
+            with gui.add_folder("Display"):
+                self._legend = LegendView(gui, self._stack, changed)
+            with gui.add_folder("About this result"):
+                self._summary = SummaryView(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self._export = ExportView(gui, self._download)
         with tabs.add_tab("Help", viser.Icon.HELP):
@@ -196,9 +198,8 @@ class Session:
         self._run.progress("writing files", 0.5)
         shown = relabel(self._stack, analysis, state.thresholds)
         name, data = make_download(shown, kind, None if everything else state.image)
+        # viser's page itself tells the name and the size
         self._client.send_file_download(name, data, save_immediately=True)
-        size = f"{len(data) / 1e6:.2f} MB"
-        self._notify("Saved", f"{name}, {size}, in the browser's downloads", "green")
 
     # --- drawing ---
 
@@ -242,7 +243,7 @@ class Session:
 
     # --- telling ---
 
-    def _notify(self, title: str, body: str, color: Literal["red", "green", "gray"]) -> None:
+    def _notify(self, title: str, body: str, color: Literal["red", "gray"]) -> None:
         if not self._closed.is_set():
             seconds = None if color == "red" else 6
             self._client.add_notification(title, body, auto_close_seconds=seconds, color=color)

@@ -12,6 +12,16 @@ KINDS = {
     "linearized (float32 TIFF)": "linearized",
     "everything (result.npz)": "result",
 }
+TEXT = """
+- **masks**: for each class a picture that is white where a pixel belongs to it
+- **label maps**: one picture for each image, in the colours of the legend; its pixel values are
+  0 U, 1 D, 2 S, 3 A, 4 C, and 255 outside the mask
+- **linearized**: diffuse reflection alone, signed, as fraction of full scale, not rounded
+- **result.npz**: labels, coefficients and linearized bases as NumPy arrays
+
+Labels are by T and Ts as the sliders stand, of the method shown. Files go where the browser keeps
+its downloads.
+"""
 THIS, ALL = "this image", "all images"
 
 
@@ -19,15 +29,10 @@ class ExportView:
     """Choice of files and a download button."""
 
     def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
-        self._kind = gui.add_dropdown(
-            "Files",
-            tuple(KINDS),
-            hint="masks: one black and white picture for each class. label maps: pixel values "
-            "0 U, 1 D, 2 S, 3 A, 4 C, 255 outside the mask. linearized: signed, fraction of full "
-            "scale. result.npz: labels, coefficients and linearized bases as arrays",
-        )
+        self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
         self._images = gui.add_dropdown("Of", (THIS, ALL), hint="result.npz holds all images")
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
+        gui.add_markdown(TEXT)
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:

@@ -22,7 +22,7 @@ class LegendView:
         self._first_gain = round(min(choose_gain(stack.images, stack.mask), MAX_GAIN), 1)
         self._switches = {
             factor: gui.add_checkbox(
-                f"{letter} {TITLES[factor]}",
+                f"{letter} {TITLES[factor].removesuffix(' shadow')}",
                 True,
                 hint=f"Show {TITLES[factor]} (key: {number})",
             )

@@ -52,7 +52,7 @@ class PixelView:
         results = [a for a in (frame.analysis, frame.beside) if a is not None]
         values = [pixel_values(stack, a, state.pixel, state.thresholds) for a in results]
         panels = [_panel(a, v) for a, v in zip(results, values, strict=True)]
-        width = 255 if len(panels) == 1 else 600
+        width = 280 if len(panels) == 1 else 600
         plot = plot_pixel(panels, state.thresholds, state.image, stack.names)
         k, own = state.image, values[0]
         sentences = (
@@ -60,7 +60,8 @@ class PixelView:
             describe_pixel(row, column, own.i, state.thresholds),
         )
         self._plot.content = (
-            f'<div style="max-width:{width}px;margin:0 auto">{plot}</div>{_text(*sentences)}'
+            f'<div style="max-width:{width}px;margin:0 auto;padding:0 0.8em">{plot}</div>'
+            f"{_text(*sentences)}"
         )
 
 
