@@ -1,8 +1,9 @@
 """Work on ranges of rows over a thread pool, with progress and cancellation between blocks."""
 
+import functools
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor, as_completed, wait
 
 from .analysis import Cancel, Progress
 from .errors import Cancelled
@@ -36,10 +37,26 @@ def run_blocks(
         if cancel is None or not cancel():
             work(*span)
 
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        for done, future in enumerate(as_completed([pool.submit(run, r) for r in ranges]), 1):
-            future.result()
-            if progress is not None:
-                progress(stage, done / len(ranges))
+    if len(ranges) == 1:
+        run(ranges[0])
+        if progress is not None:
+            progress(stage, 1.0)
+    else:
+        futures = [_pool(threads or os.cpu_count() or 1).submit(run, span) for span in ranges]
+        try:
+            for done, future in enumerate(as_completed(futures), 1):
+                future.result()
+                if progress is not None:
+                    progress(stage, done / len(ranges))
+        finally:
+            for future in futures:
+                future.cancel()
+            wait(futures)
     if cancel is not None and cancel():
         raise Cancelled(f"{stage or 'the run'} was cancelled")
+
+
+@functools.cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads shared by all callers: starting them takes longer than a small block of work."""
+    return ThreadPoolExecutor(threads, "block")

@@ -23,6 +23,8 @@ COARSE = (6.0, 4.0, 3.0)
 """T during alternation, in units of T."""
 MAX_T = 0.3
 ROUGH_PIXELS = 1000
+FINALISTS = 2
+"""Starts, of all tried, that are followed beyond the first alternation."""
 MIN_SCORE = 4
 """D - U a pixel needs to have a say in the coefficients: three D observations fit anything."""
 
@@ -76,11 +78,16 @@ def search_coefficients(
             f"{thresholds.Ts:g}), which tells nothing of its light; take it out or lower Ts"
         )
     few = sample.thin(ROUGH_PIXELS)
-    found = []
-    for triple in starts:
-        first = start_coefficients(few, triple, thresholds, seed, limit)
-        if first is not None:
-            found.append(alternate(few, first, thresholds, COARSE, seed, limit, cancel))
+    first = [start_coefficients(few, triple, thresholds, seed, limit) for triple in starts]
+    found = [
+        alternate(few, c, thresholds, COARSE[:1], seed, limit, cancel)
+        for c in first
+        if c is not None
+    ]
+    best = sorted((f for f in found if f is not None), key=lambda f: -f.score)[:FINALISTS]
+    found = [
+        alternate(few, f.coefficients, thresholds, COARSE[1:], seed, limit, cancel) for f in best
+    ]
     found = [f for f in found if f is not None]
     if not found:
         raise DegenerateError(NO_START)

@@ -55,8 +55,8 @@ def suggest_thresholds(
     """Thresholds for a stack; T or Ts given in `options` are kept.
 
     Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T is
-    a multiple of the noise seen on the negative side (i < l) of D residuals, where highlights cannot
-    be, after a provisional linearization.
+    a multiple of the noise seen on the negative side (i < l) of D residuals, where highlights
+    cannot be, after a provisional linearization.
 
     Args:
         lights: (K,3) where known; coefficients are then not estimated.
