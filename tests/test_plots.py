@@ -10,12 +10,12 @@ from webapp.plots import PixelPanel, plot_pixel
 
 SVG = "{http://www.w3.org/2000/svg}"
 THRESHOLDS = Thresholds(0.1, 0.05)
-I = np.array([0.8, 0.6, 0.01, 0.01, 0.3], np.float32)  # noqa: E741
+I = np.array([0.8, 0.6, 0.01, 0.01, 0.3], np.float32)
 L = np.array([0.8, 0.3, -0.2, 0.4, 0.6], np.float32)
 NAMES = [f"image {k}" for k in range(5)]
 
 
-def panel(i=I, l=L, title="robust") -> PixelPanel:  # noqa: E741
+def panel(i=I, l=L, title="robust") -> PixelPanel:
     return PixelPanel(title, i, l, classify(i, l, THRESHOLDS))
 
 
@@ -85,7 +85,7 @@ def test_dots_lie_in_the_region_of_their_class():
     rng = np.random.default_rng(0)
     i = rng.uniform(0, 1, 300).astype(np.float32)
     i[:100] *= THRESHOLDS.Ts
-    l = rng.uniform(-0.6, 1.2, 300).astype(np.float32)  # noqa: E741
+    l = rng.uniform(-0.6, 1.2, 300).astype(np.float32)
     l[200:] = i[200:] * rng.uniform(0.85, 1.15, 100)
     names = [f"image {k}" for k in range(300)]
     (svg,) = panels_of(plot_pixel([panel(i, l)], THRESHOLDS, 0, names))
@@ -146,7 +146,7 @@ def test_names_cannot_become_markup():
 
 
 def test_an_unknown_value_has_no_dot_and_a_wild_one_stays_on_the_border():
-    l = L.copy()  # noqa: E741
+    l = L.copy()
     l[1], l[2], l[4] = np.nan, -1000, 1000
     (svg,) = panels_of(plot_pixel([panel(l=l)], THRESHOLDS, 0, NAMES))
     found = dots(svg)
@@ -160,6 +160,6 @@ def test_an_unknown_value_has_no_dot_and_a_wild_one_stays_on_the_border():
 @pytest.mark.parametrize("thresholds", [Thresholds(1.0, 0.0), Thresholds(1e-6, 0.999)])
 def test_extreme_thresholds_and_a_black_pixel_still_make_a_plot(thresholds):
     black = np.zeros(5, np.float32)
-    for l in (black, np.full(5, np.nan, np.float32)):  # noqa: E741
+    for l in (black, np.full(5, np.nan, np.float32)):
         (svg,) = panels_of(plot_pixel([panel(black, l)], thresholds, 0, NAMES))
         assert svg is not None

@@ -70,13 +70,13 @@ THRESHOLDS = Thresholds(0.05, 0.02)
         ),
     ],
 )
-def test_the_rule_that_decided_is_told_with_its_numbers(i, l, sentence):  # noqa: E741
+def test_the_rule_that_decided_is_told_with_its_numbers(i, l, sentence):
     assert explain(i, l, THRESHOLDS, "Image 07") == sentence
 
 
 def test_the_sentence_names_the_class_that_the_backend_gives_all_over_the_plane():
     for i in np.linspace(0, 1, 41):
-        for l in np.linspace(-1, 1.5, 51):  # noqa: E741
+        for l in np.linspace(-1, 1.5, 51):
             factor = Factor(int(classify(i, l, THRESHOLDS)))
             assert f": {TITLES[factor]}" in explain(i, l, THRESHOLDS, "a")
 
