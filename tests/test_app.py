@@ -413,8 +413,7 @@ def test_classes_are_switched_and_outlined(page: Any, app: App) -> None:
     wait_for_colours(page, blended(picture(0), RESULT.labels[0], **look), tolerance=1)
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (3840, 2160)])
-def test_what_is_used_together_is_seen_together(page: Any, app: App, size: tuple[int, int]) -> None:
+def test_what_is_used_together_is_seen_together_in_a_small_window(page: Any, app: App) -> None:
     session = enter(page, app)
     click_pixel(page, 30, 20)
     page.locator("svg[role=img]").wait_for()
