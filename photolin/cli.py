@@ -39,7 +39,7 @@ from .export import (
     load_result_stack,
     program_version,
     save_result,
-    write_file,
+    write_files,
 )
 from .load import LoadOptions, load_stack
 from .paper import compare_with_paper
@@ -168,8 +168,7 @@ def export(
     files: dict[str, bytes] = {}
     for contents in what or CONTENTS:
         files |= export_files(analysis, contents, image or None)
-    for name, data in files.items():
-        write_file(out / name, data)
+    write_files(out, files)
     print(f"written {len(files)} files to {out}")
 
 

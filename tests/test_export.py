@@ -25,7 +25,7 @@ from photolin.export import (
     mask_png,
     result_npz,
     save_result,
-    write_file,
+    write_files,
     zip_files,
 )
 from photolin.factors import OUTSIDE, PALETTE, Factor, Thresholds, classify
@@ -233,16 +233,52 @@ def test_an_interrupted_write_leaves_the_old_file_and_no_other(
 
     monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises((KeyboardInterrupt, OutputError)):
-        write_file(target, b"new and longer")
+        write_files(tmp_path, {target.name: b"new and longer"})
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_disk_that_fills_up_between_two_files_leaves_the_earlier_result(
+    analysis: Analysis, saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = Path.write_bytes
+
+    def full(path: Path, data: bytes) -> int:
+        if "report.json" in path.name:
+            raise OSError(28, "No space left on device")
+        return real(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match=r"report\.json: cannot be written \(No space left"):
+        save_result(replace(analysis, thresholds=Thresholds(0.5, 0)), saved)
+    assert equal(load_result(saved), analysis)
+    assert sorted(p.name for p in saved.iterdir()) == ["report.json", "result.npz"]
+
+
+def test_a_folder_in_the_place_of_a_file_keeps_all_from_being_written(
+    analysis: Analysis, tmp_path: Path
+) -> None:
+    (tmp_path / "report.json").mkdir()
+    with pytest.raises(OutputError, match=r"report\.json: cannot be written \(Is a directory\)"):
+        save_result(analysis, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+
+
+@pytest.mark.parametrize("target", ["out", "gone"])
+def test_an_output_that_is_a_link_to_nothing_is_refused(
+    analysis: Analysis, tmp_path: Path, target: str
+) -> None:
+    (tmp_path / "out").symlink_to(tmp_path / target)
+    for folder in (tmp_path / "out", tmp_path / "out" / "deeper"):
+        with pytest.raises(OutputError, match=r"out: is a link to nothing; a folder, .* accepted"):
+            save_result(analysis, folder)
 
 
 def test_a_reader_of_the_old_file_never_sees_a_mix(tmp_path: Path) -> None:
     target = tmp_path / "result.npz"
     target.write_bytes(b"old")
     with target.open("rb", buffering=0) as reader:
-        write_file(target, b"new and longer")
+        write_files(tmp_path, {target.name: b"new and longer"})
         assert reader.read() == b"old"
     assert target.read_bytes() == b"new and longer"
 
@@ -272,7 +308,8 @@ def test_a_result_without_its_report_is_refused(saved: Path) -> None:
 
 
 def test_a_report_of_another_result_is_refused(analysis: Analysis, saved: Path) -> None:
-    write_file(saved / "result.npz", result_npz(replace(analysis, thresholds=Thresholds(0.5, 0))))
+    other = replace(analysis, thresholds=Thresholds(0.5, 0))
+    (saved / "result.npz").write_bytes(result_npz(other))
     with pytest.raises(InputError, match=r"result\.npz: .*report\.json describes another"):
         load_result(saved)
 

@@ -7,7 +7,7 @@ from .files import (
     label_png,
     linearized_tiff,
     mask_png,
-    write_file,
+    write_files,
     zip_files,
 )
 from .report import program_version
@@ -34,6 +34,6 @@ __all__ = [
     "program_version",
     "result_npz",
     "save_result",
-    "write_file",
+    "write_files",
     "zip_files",
 ]

@@ -6,6 +6,7 @@ import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from errno import EISDIR
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -110,24 +111,35 @@ def zip_files(files: Mapping[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write `data` whole or not at all, making folders, replacing what was there.
+def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write all `files` (name to bytes) into `folder`, or none of them.
+
+    Folders are made, earlier files of the same names replaced. All are written under other names
+    first, so that a disk that fills up leaves every earlier file as it was.
 
     Raises:
         OutputError: the folder cannot be made or written, or the disk is full.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partials = {name: folder / f".{name}.{os.getpid()}.partial" for name in files}
+    path = folder
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(data)
-        os.replace(partial, path)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            path = folder / name
+            if path.is_dir():
+                raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
+            partials[name].write_bytes(data)
+        for name, partial in partials.items():
+            path = folder / name
+            os.replace(partial, path)
     except OSError as error:
         raise OutputError(
             f"{path}: cannot be written ({error.strerror}); a writable folder with room is accepted"
         ) from error
     finally:
-        with suppress(OSError):
-            partial.unlink()
+        for partial in partials.values():
+            with suppress(OSError):
+                partial.unlink()
 
 
 def _png(image: Image.Image, **options: int) -> bytes:

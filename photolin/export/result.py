@@ -17,7 +17,7 @@ from ..errors import InputError, OutputError, PhotolinError
 from ..factors import OUTSIDE, Thresholds
 from ..load import LoadOptions, load_stack
 from ..stack import ImageStack
-from .files import write_file
+from .files import write_files
 from .report import (
     REPORT,
     RESULT,
@@ -72,17 +72,17 @@ def save_result(
         "result_sha256": hashlib.sha256(arrays).hexdigest(),
     }
     text = json.dumps(report, indent=1) + "\n"
-    write_file(folder / RESULT, arrays)
-    write_file(folder / REPORT, text.encode())
+    write_files(folder, {RESULT: arrays, REPORT: text.encode()})
 
 
 def check_output(folder: str | Path) -> None:
     """Raise OutputError unless `folder` can be made or written; touches nothing."""
     folder = Path(folder)
     above = (folder.absolute(), *folder.absolute().parents)
-    there = next(path for path in above if os.path.exists(path))
+    there = next(path for path in above if os.path.lexists(path))
     if not there.is_dir():
-        raise OutputError(f"{there}: is a file; a folder, or a name for a new one, is accepted")
+        what = "a file" if there.exists() else "a link to nothing"
+        raise OutputError(f"{there}: is {what}; a folder, or a name for a new one, is accepted")
     if not os.access(there, os.W_OK | os.X_OK):
         raise OutputError(f"{there}: cannot be written; a writable folder is accepted")
 
