@@ -19,6 +19,7 @@ from tyro.conf import Positional
 from .analysis import METHODS, Analysis, Options, Progress
 from .console import (
     complain,
+    mend_streams,
     parse,
     progress_bar,
     run_summary,
@@ -56,6 +57,7 @@ VERBS: dict[str, Callable[..., Callable[[], None]]] = {}
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line (without the program's name) and return its exit status."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
+    mend_streams()
     try:
         if arguments == ["--version"]:
             print(f"photolin {program_version()}")
@@ -100,7 +102,7 @@ def run(
         threads: Processors to use; all when left out. The result does not depend on it.
     """
     check_output(out)
-    if stack.resolve() in (out.resolve(), (out / "result.npz").resolve()):
+    if os.path.realpath(stack) in map(os.path.realpath, (out, out / "result.npz")):
         raise OutputError(f"{out}: holds the input; another folder is accepted")
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
         images, seconds = _load(stack, reading, progress)

@@ -48,6 +48,16 @@ def parse(verbs: dict[str, Callable[..., Call]], arguments: Sequence[str]) -> Ca
     raise OptionError(f"{_unbox(box.getvalue())}; {hint} lists what is accepted") from None
 
 
+def mend_streams() -> None:
+    """Let printing neither fail where a stream is closed nor at names it has no letters for."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, io.StringIO())
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def complain(error: BaseException) -> int:
     """Print exactly one line on stderr and return the exit status that goes with it."""
     match error:
@@ -59,6 +69,15 @@ def complain(error: BaseException) -> int:
             status, message = 130, "stopped"
         case _ if os.environ.get("PHOTOLIN_DEBUG") == "1":
             raise error
+        case OSError():  # what is printed, or the current folder: files of ours are PhotolinError
+            where = error.filename or "the output or the current folder"
+            status, message = (
+                2,
+                (
+                    f"{where}: cannot be used ({error.strerror or error}); "
+                    "a place that exists, with room and permission, is accepted"
+                ),
+            )
         case _:
             fault = f"{type(error).__name__}: {error}"
             status, message = 1, f"{fault} (a fault of photolin; please report it and the command)"

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -272,6 +273,22 @@ def test_a_fault_shows_its_traceback_on_request(stack: Path, tmp_path, monkeypat
         main(["run", str(stack), str(tmp_path / "out")])
 
 
+@pytest.mark.parametrize("role", ["stack", "out", "mask", "truth"])
+def test_links_that_go_in_circles_are_refused(
+    stack: Path, tmp_path: Path, capsys, role: str
+) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    loop, out = tmp_path / "loop", tmp_path / "out"
+    arguments = {
+        "stack": ["run", loop, out],
+        "out": ["run", stack, loop],
+        "mask": ["run", stack, out, "--mask", loop],
+        "truth": ["evaluate", stack, loop],
+    }[role]
+    assert f"{loop}: " in complaint(arguments, capsys)
+    assert not out.exists()
+
+
 @contextmanager
 def start(*arguments: str | Path, **streams: int) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", "photolin", *map(str, arguments)]
@@ -301,3 +318,25 @@ def test_a_pipe_whose_reader_leaves_is_no_error(stack: Path) -> None:
         os.close(write)
         assert process.communicate(timeout=20)[1] == ""
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("shell", "status", "err"),
+    [
+        ('exec "$@"', 0, ""),
+        ('exec "$@" >&-', 0, ""),
+        ('exec "$@" 2>&-', 0, ""),
+        ('exec "$@" > /dev/full', 2, "photolin: .*No space left on device.*\n"),
+    ],
+    ids=["ascii", "no stdout", "no stderr", "full"],
+)
+def test_what_cannot_be_printed_is_no_fault(
+    stack: Path, tmp_path: Path, shell: str, status: int, err: str
+) -> None:
+    named = tmp_path / "gr\u00f6\u00dfe"
+    shutil.copytree(stack, named)
+    command = ["sh", "-c", shell, "sh", sys.executable, "-m", "photolin", "info", str(named)]
+    ascii_only = os.environ | {"PYTHONIOENCODING": "ascii:strict"}
+    done = subprocess.run(command, cwd=ROOT, env=ascii_only, capture_output=True, check=False)
+    assert done.returncode == status
+    assert re.fullmatch(err, done.stderr.decode())
