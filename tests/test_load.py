@@ -1,6 +1,7 @@
 """load_stack as a whole: laws, decisions it states, refusals, real stacks."""
 
 import hashlib
+import os
 from pathlib import Path
 from typing import Any
 
@@ -214,6 +215,24 @@ def test_a_broken_image_among_good_ones_is_named(folder: Path) -> None:
     (folder / "img6.png").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"img6\.png: is truncated or not a PNG image"):
         load_stack(folder)
+
+
+def test_an_image_that_is_a_link_to_nothing_or_a_pipe_is_named(folder: Path) -> None:
+    (folder / "img3.png").unlink()
+    (folder / "img3.png").symlink_to(folder / "gone.png")
+    with pytest.raises(InputError, match=r"img3\.png: cannot be read \(No such file"):
+        load_stack(folder)
+    (folder / "img3.png").unlink()
+    os.mkfifo(folder / "img3.png")
+    with pytest.raises(InputError, match=r"img3\.png: is a folder or a device"):
+        load_stack(folder)
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.npz", "a.tif"])
+def test_a_pipe_is_no_stack(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match="is not a stack"):
+        load_stack(tmp_path / name)
 
 
 def test_nan_is_refused_with_the_image(tmp_path: Path) -> None:

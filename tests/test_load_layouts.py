@@ -164,6 +164,9 @@ def test_diligent_files_that_disagree_are_named(tmp_path: Path) -> None:
     np.savetxt(folder / "light_intensities.txt", np.ones((11, 3)))
     with pytest.raises(InputError, match=r"light_intensities\.txt: holds 11 powers for 12 images"):
         load_stack(folder)
+    np.savetxt(folder / "light_intensities.txt", np.full((12, 3), 1e-45))
+    with pytest.raises(InputError, match=r"l\.png: holds NaN or infinity"):
+        load_stack(folder)
     np.savetxt(folder / "light_intensities.txt", np.zeros((12, 3)))
     with pytest.raises(InputError, match=r"light_intensities\.txt: .* from 0; .* positive"):
         load_stack(folder)
@@ -272,6 +275,23 @@ def test_arrays_that_cannot_be_used_are_refused_in_words(tmp_path: Path) -> None
     refuse("g.npz", r"g\.npz: is truncated or not a numpy file")
     (tmp_path / "g.npy").write_bytes((tmp_path / "b.npy").read_bytes()[:60])
     refuse("g.npy", r"g\.npy: is truncated or not a numpy file")
+
+
+@pytest.mark.parametrize("huge", [1e39, 1e300, np.inf])
+def test_values_beyond_single_precision_are_refused_without_a_warning(
+    tmp_path: Path, huge: float
+) -> None:
+    images = STACK / 65535
+    images[3, 1, 2] = huge
+    np.save(tmp_path / "a.npy", images)
+    with pytest.raises(InputError, match=r"image 3: holds NaN or infinity"):
+        load_stack(tmp_path / "a.npy")
+
+
+def test_nan_in_a_mask_is_outside(tmp_path: Path) -> None:
+    mask = np.where(MASK > 0, 1.0, np.nan)
+    np.savez(tmp_path / "a.npz", images=STACK, mask=mask)
+    np.testing.assert_array_equal(load_stack(tmp_path / "a.npz").mask, MASK > 0)
 
 
 def test_a_huge_array_is_refused_from_its_header(tmp_path: Path) -> None:

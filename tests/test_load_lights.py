@@ -82,10 +82,12 @@ def test_files_that_hold_no_lights_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_bytes(b"\xff\xfe\x00\x81")
     np.save(tmp_path / "a.npy", np.array([{}], object), allow_pickle=True)
     np.save(tmp_path / "b.npy", np.array(1.0))
+    np.save(tmp_path / "d.npy", np.ones((6, 3), complex))
     for name, words in (
         ("a.txt", "is not text"),
         ("a.npy", "is not a plain array file"),
         ("b.npy", "1 lights for 6 images"),
+        ("d.npy", "holds no numbers"),
         ("c.txt", "cannot be read"),
         ("c.npy", "is not a plain array file"),
     ):

@@ -257,6 +257,13 @@ def test_text_in_an_image_file_is_refused_with_its_name(tmp_path: Path, kind: st
         read_picture(tmp_path / f"a.{kind}")
 
 
+@pytest.mark.parametrize("full", [0, 65536])
+def test_a_pgm_with_an_impossible_full_scale_is_refused(tmp_path: Path, full: int) -> None:
+    (tmp_path / "a.pgm").write_bytes(b"P5\n2 2\n%d\n" % full + b"1234" * 2)
+    with pytest.raises(InputError, match=rf"a\.pgm: .*full scale of {full}; 1 to 65535"):
+        read_picture(tmp_path / "a.pgm")
+
+
 def test_other_files_are_refused_with_what_is_accepted(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"a\.gif: is no image file; accepted are \.png, \.tif"):
         read_picture(tmp_path / "a.gif")

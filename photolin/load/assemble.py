@@ -76,7 +76,7 @@ def find_layout(path: Path) -> Layout:
         return find_diligent(path) if diligent else find_folder(path)
     if not path.exists():
         raise InputError(f"{path}: does not exist; {accepted}")
-    kind = path.suffix.lower()
+    kind = path.suffix.lower() if path.is_file() else ""  # a pipe would never end
     if kind in (".tif", ".tiff"):
         return find_pages(path)
     if kind in (".npz", ".npy"):
@@ -116,7 +116,7 @@ def _read_mask(layout: Layout, plan: Plan) -> tuple[NDArray[np.bool_], str]:
         mask, source = bright > bright.max() / 2, found.name
         check_mask(mask, shape, str(found))
     else:
-        mask, source = found != 0, f"of {layout.where.name}"
+        mask, source = np.nan_to_num(found) != 0, f"of {layout.where.name}"
         check_mask(mask, shape, str(layout.where))
     mask = np.ascontiguousarray(mask[plan.region])
     check_mask(mask, mask.shape, f"{layout.where}, region of interest")

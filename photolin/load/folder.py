@@ -63,7 +63,9 @@ def sort_files(folder: Path) -> dict[str, list[Path]]:
         (
             path
             for path in folder.iterdir()
-            if path.suffix.lower() in READERS and not path.name.startswith(".") and path.is_file()
+            if path.suffix.lower() in READERS
+            and not path.name.startswith(".")
+            and not path.is_dir()
         ),
         key=_natural,
     )

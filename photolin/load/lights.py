@@ -91,8 +91,11 @@ def _in_order_of(names: tuple[str, ...], labels: list[str], lights: NDArray) -> 
 
 def _read_npy(path: Path) -> NDArray[np.float64]:
     try:
-        return np.atleast_2d(np.load(path, allow_pickle=False).astype(np.float64))
+        lights = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(
             f"{path}: is not a plain array file ({error}); .npy of shape (images, 3) is accepted"
         ) from error
+    if not isinstance(lights, np.ndarray) or lights.dtype.kind not in "buif":
+        raise InputError(f"{path}: holds no numbers; .npy of shape (images, 3) is accepted")
+    return np.atleast_2d(lights.astype(np.float64))

@@ -7,6 +7,7 @@ have 8 bits.
 
 import logging
 import re
+import stat
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,6 +57,8 @@ def read_picture(path: Path) -> Picture:
     if kind not in READERS:
         raise InputError(f"{path}: is no image file; accepted are {', '.join(READERS)}")
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise InputError(f"{path}: is a folder or a device; an image file is accepted")
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
@@ -169,6 +172,8 @@ def _read_pnm(data: bytes, where: str) -> Picture:
         raise ValueError("no P2, P3, P5 or P6 header")
     kind, columns, rows, full = (int(number) for number in header.groups())
     check_size(rows, columns, where)
+    if not 0 < full < 65536:
+        raise ValueError(f"full scale of {full}; 1 to 65535 is the format's")
     shape = (rows, columns, 3 if kind in (3, 6) else 1)
     dtype = np.uint8 if full < 256 else np.uint16
     if kind in (2, 3):

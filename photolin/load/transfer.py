@@ -36,7 +36,8 @@ def linear_plane(
         # All values there can be, decoded once, in double precision.
         table = decode(np.arange(2 ** (8 * stored.dtype.itemsize)) / picture.full)
         return table.astype(np.float32)[stored]
-    return decode(stored.astype(np.float64) / picture.full).astype(np.float32)
+    with np.errstate(over="ignore"):  # what single precision cannot hold is refused as infinite
+        return decode(stored.astype(np.float64) / picture.full).astype(np.float32)
 
 
 def one_channel(
@@ -67,8 +68,10 @@ def one_channel(
             continue
         plane = linear_plane(picture, c, transfer)
         if dark is not None:
-            plane -= dark[c]
-        plane *= np.float32(weight if power is None else weight / power[c])
+            with np.errstate(invalid="ignore"):
+                plane -= dark[c]
+        with np.errstate(over="ignore", invalid="ignore"):  # as in linear_plane
+            plane *= np.float32(weight if power is None else weight / power[c])
         if total is None:
             total = plane
         elif channel == "max":
