@@ -370,6 +370,7 @@ def test_a_write_that_fails_leaves_nothing_behind(
         ({"noise": float("nan")}, "noise is nan; accepted is a fraction"),
         ({"bits": 12}, "bits is 12; accepted are 8, 16 and None"),
         ({"ambient": 1.0}, "ambient is 1; accepted is a fraction"),
+        ({"seed": -1, "noise": 0.01}, "seed is -1; accepted is 0 to 4294967295"),
     ],
 )
 def test_an_option_out_of_range_is_refused_with_its_range(options: dict, words: str) -> None:
@@ -432,4 +433,26 @@ def test_truth_that_does_not_fit_is_refused(
     arrays = {k: getattr(small.truth, k) for k in files.KEYS}
     np.savez(tmp_path / "gt.npz", **{**arrays, key: value})
     with pytest.raises(InputError, match=words):
+        load_truth(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("labels", 0, "labels hold no class"),
+        ("labels", 5, "or others than 0 to 4"),
+        ("labels", np.nan, "or others than 0 to 4"),
+        ("mask", 0, "labels hold no class"),
+        ("ideal", np.inf, "ideal holds NaN or infinity"),
+        ("ideal", 1e300, "ideal holds NaN or infinity"),
+        ("lights", 0, "a light is zero or not finite"),
+        ("lights", np.nan, "a light is zero or not finite"),
+    ],
+)
+def test_truth_with_values_nothing_can_be_measured_against_is_refused(
+    small: Scene, tmp_path: Path, key: str, value: float, words: str
+) -> None:
+    arrays = {k: getattr(small.truth, k) for k in files.KEYS}
+    np.savez(tmp_path / "gt.npz", **{**arrays, key: np.full(arrays[key].shape, value)})
+    with pytest.raises(InputError, match=rf"gt\.npz: .*{words}.*is accepted"):
         load_truth(tmp_path)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..factors import LETTERS, OUTSIDE
+from ..factors import LETTERS, OUTSIDE, Factor
 from .render import Scene, Truth
 
 KEYS = tuple(Truth.__dataclass_fields__)
@@ -132,12 +132,28 @@ def _check_truth(arrays: dict[str, np.ndarray], path: Path) -> Truth:
         "mask": ((H, W), np.bool_),
         "px_mm": ((), np.float64),
     }
-    for key, (shape, dtype) in expected.items():
+    for key, (shape, _) in expected.items():
         if arrays[key].shape != shape or arrays[key].dtype.kind not in "biuf":
             raise InputError(
                 f"{path}: {key} is {arrays[key].dtype} of shape {arrays[key].shape}; "
                 f"numbers of shape {shape}, to fit the labels, are accepted"
             )
-        arrays[key] = arrays[key].astype(dtype)
+    if (wrong := _find_wrong_values(arrays)) is not None:
+        raise InputError(f"{path}: {wrong} is accepted")
+    with np.errstate(over="ignore", invalid="ignore"):  # in what is not measured against
+        arrays = {key: arrays[key].astype(dtype) for key, (_, dtype) in expected.items()}
     arrays["labels"][:, ~arrays["mask"]] = OUTSIDE
     return Truth(px_mm=float(arrays.pop("px_mm")), **arrays)
+
+
+def _find_wrong_values(arrays: dict[str, np.ndarray]) -> str | None:
+    """What a result cannot be measured against, and what can instead."""
+    mask = arrays["mask"].astype(bool)
+    labels, ideal, lights = arrays["labels"][:, mask], arrays["ideal"][:, mask], arrays["lights"]
+    if not np.isin(labels, tuple(Factor)).all() or not labels.any():
+        return "labels hold no class, or others than 0 to 4, in the mask; a class for each pixel"
+    if not (np.abs(ideal) < np.finfo(np.float32).max).all():
+        return "ideal holds NaN or infinity in the mask; a number for each pixel"
+    if not (np.abs(lights) < 1e9).all() or not lights.any(axis=1).all():
+        return "a light is zero or not finite; a direction for each image"
+    return None

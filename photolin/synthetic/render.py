@@ -99,7 +99,7 @@ def render_scene(
         size: rows and columns, 16 to 4096; the scene's own when left out.
         images: number of images, 6 to 1000; the scene's own when left out. The first n lights are
             the same for every number.
-        seed: seed of the noise; nothing else is random.
+        seed: seed of the noise, 0 to 4294967295; nothing else is random.
         noise: standard deviation of Gaussian noise, fraction of full scale, 0 to 1.
         bits: 8 or 16 bits of quantisation; None for none.
         ambient: constant level added to every pixel, fraction of full scale, 0 to below 1.
@@ -111,7 +111,7 @@ def render_scene(
         OptionError: an argument is out of range, or all together are too large.
     """
     setup = _configure(name, size, images)
-    _check_camera(noise, bits, ambient)
+    _check_camera(noise, bits, ambient, seed)
     truth, exact = render_truth(setup)
     taken = exact + ambient
     if noise:
@@ -225,10 +225,12 @@ def _configure(name: str, size: tuple[int, int] | None, images: int | None) -> S
     return replace(setup, size=(H, W), images=count)
 
 
-def _check_camera(noise: float, bits: int | None, ambient: float) -> None:
+def _check_camera(noise: float, bits: int | None, ambient: float, seed: int) -> None:
     if not (isfinite(noise) and 0 <= noise <= 1):
         raise OptionError(f"noise is {noise:g}; accepted is a fraction of full scale, 0 to 1")
     if bits not in (8, 16, None):
         raise OptionError(f"bits is {bits}; accepted are 8, 16 and None")
     if not (isfinite(ambient) and 0 <= ambient < 1):
         raise OptionError(f"ambient is {ambient:g}; accepted is a fraction, 0 to below 1")
+    if not 0 <= seed < 2**32:
+        raise OptionError(f"seed is {seed}; accepted is 0 to 4294967295")
