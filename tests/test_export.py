@@ -339,8 +339,14 @@ def test_a_foreign_report_is_refused(saved: Path, text: str) -> None:
         load_result(saved)
 
 
-@pytest.mark.parametrize("key", ["options", "images", "files", "seconds", "title", "notes"])
-@pytest.mark.parametrize("value", [None, 3, {"T": "high"}])
+RIGHT = [("title", "\ud800"), ("files", []), ("notes", [])]
+KEYS = ["options", "images", "files", "seconds", "title", "notes"]
+VALUES: list[object] = [None, 3, {"T": "high"}, [3], [], "\ud800"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [(k, v) for k in KEYS for v in VALUES if (k, v) not in RIGHT]
+)
 def test_a_report_with_a_wrong_entry_is_refused(saved: Path, key: str, value: object) -> None:
     report = json.loads((saved / "report.json").read_text())
     (saved / "report.json").write_text(json.dumps(report | {key: value}))
@@ -357,6 +363,9 @@ def test_an_archive_of_other_arrays_is_refused(saved: Path) -> None:
         good | {"labels": good["labels"][:-1]},
         good | {"coefficients": good["coefficients"][:, :2]},
         good | {"mask": ~good["mask"]},
+        good | {"labels": np.where(np.arange(K)[:, None, None] == 1, 0, good["labels"])},
+        good | {"base_images": np.array([0, 1, K])},
+        good | {"base_images": np.array([0, 1, 1])},
         good | {"linearized_bases": np.array([None, {}], object)},
     ]
     for arrays in bad:
@@ -366,6 +375,16 @@ def test_an_archive_of_other_arrays_is_refused(saved: Path) -> None:
         (saved / "report.json").write_text(json.dumps(report))
         with pytest.raises(InputError, match=r"result\.npz: is not a result of photolin"):
             load_result(saved)
+
+
+@pytest.mark.parametrize("entry", [{"stack": 3}, {"load": {"roi": []}}, {"load": {"x": 1}}])
+def test_a_report_that_does_not_say_how_its_images_were_read_is_refused(
+    saved: Path, entry: dict[str, object]
+) -> None:
+    report = json.loads((saved / "report.json").read_text()) | {"stack": str(saved)}
+    (saved / "report.json").write_text(json.dumps(report | entry))
+    with pytest.raises(InputError, match=r"report\.json: is not a result of photolin"):
+        load_result_stack(saved)
 
 
 def test_a_result_whose_images_moved_names_the_way_out(analysis: Analysis, tmp_path: Path) -> None:

@@ -5,8 +5,9 @@ import json
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
+import msgspec
 import numpy as np
 
 from ..analysis import Analysis
@@ -16,16 +17,32 @@ from ..load import LoadOptions
 
 RESULT, REPORT = "result.npz", "report.json"
 
-ENTRIES = {
-    "title": str,
-    "options": dict,
-    "files": list,
-    "notes": list,
-    "warnings": list,
-    "images": list,
-    "seconds": dict,
-}
-"""Type of each entry of report.json that is read back."""
+
+class FileEntry(TypedDict):
+    """A file that was read."""
+
+    path: str
+    sha256: str
+
+
+class ImageEntry(TypedDict):
+    """An image of the stack."""
+
+    name: str
+
+
+class Report(TypedDict):
+    """The entries of report.json that are read back."""
+
+    title: str
+    options: dict[str, Any]
+    files: list[FileEntry]
+    notes: list[str]
+    warnings: list[str]
+    images: list[ImageEntry]
+    seconds: dict[str, float]
+    stack: str | None
+    load: dict[str, Any] | None
 
 
 def program_version() -> str:
@@ -85,7 +102,7 @@ def restore_reading(entry: dict[str, Any] | None) -> LoadOptions:
     return LoadOptions(**entry)
 
 
-def read_report(file: Path) -> dict[str, Any]:
+def read_report(file: Path) -> Report:
     """The report beside result.npz, once it is known to be about that very file."""
     path = file.with_name(REPORT)
     try:
@@ -99,9 +116,10 @@ def read_report(file: Path) -> dict[str, Any]:
             f"{file}: was cut short, or {REPORT} describes another; "
             "both files as photolin run wrote them are accepted"
         )
-    if not all(isinstance(report.get(key), kind) for key, kind in ENTRIES.items()):
-        raise foreign(path)
-    return report
+    try:
+        return msgspec.convert(report, Report)
+    except (msgspec.ValidationError, ValueError) as error:  # the latter for lone surrogates
+        raise foreign(path) from error
 
 
 def read_bytes(path: Path) -> bytes:

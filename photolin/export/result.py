@@ -121,10 +121,13 @@ def load_result(path: str | Path) -> Analysis:
     file = _result_file(path)
     report, arrays = read_report(file), _read_arrays(file)
     try:
-        options = report["options"]
+        options = dict(report["options"])
         if options["base_images"] is not None:
-            options = options | {"base_images": tuple(options["base_images"])}
+            options["base_images"] = tuple(options["base_images"])
         first, second, third = arrays["base_images"].tolist()
+        names = tuple(image["name"] for image in report["images"])
+        if len(names) != len(arrays["labels"]) or "total" not in report["seconds"]:
+            raise foreign(file.with_name(REPORT))
         return Analysis(
             options=Options(**options),
             thresholds=Thresholds(float(arrays["T"]), float(arrays["Ts"])),
@@ -133,7 +136,7 @@ def load_result(path: str | Path) -> Analysis:
             linearized_bases=arrays["linearized_bases"],
             labels=arrays["labels"],
             mask=arrays["mask"],
-            names=tuple(image["name"] for image in report["images"]),
+            names=names,
             seconds={stage: float(s) for stage, s in report["seconds"].items()},
             title=report["title"],
             lights=arrays.get("lights"),
@@ -157,14 +160,14 @@ def load_result_stack(path: str | Path, stack_path: str | Path | None = None) ->
     """
     file = _result_file(path)
     report = read_report(file)
-    place = stack_path or report.get("stack")
+    place = stack_path or report["stack"]
     if place is None or not Path(place).exists():
         where = "nothing says where they were" if place is None else f"{place} is missing"
         raise InputError(f"{file}: its images are not found ({where}); name them with --stack")
     try:
         options = restore_reading(report["load"])
         known = {entry["sha256"] for entry in report["files"]}
-    except (KeyError, TypeError, AttributeError, PhotolinError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, PhotolinError) as error:
         raise foreign(file.with_name(REPORT)) from error
     stack = load_stack(Path(place), options)
     changed = [name for name, digest in stack.files if digest not in known]
@@ -208,6 +211,9 @@ def _read_arrays(file: Path) -> Mapping[str, NDArray]:
         for axis, size in zip(axes, array.shape, strict=True):
             if sizes.setdefault(axis, size) != size:
                 raise foreign(file)
-    if not np.array_equal(arrays["labels"][0] == OUTSIDE, ~arrays["mask"]):
+    bases = set(arrays["base_images"].tolist())
+    if len(bases) != 3 or not bases <= set(range(len(arrays["labels"]))):
+        raise foreign(file)
+    if ((arrays["labels"] == OUTSIDE) == arrays["mask"]).any():
         raise foreign(file)
     return arrays
