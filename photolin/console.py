@@ -13,6 +13,7 @@ import tyro
 from tqdm import tqdm
 
 from .analysis import Analysis, Cancel, Progress
+from .compiling import COMPILING, tell_compiling
 from .errors import OptionError, PhotolinError
 from .factors import OUTSIDE, TITLES
 from .stack import ImageStack
@@ -123,15 +124,22 @@ def stop_at_ctrl_c() -> Iterator[Cancel]:
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar on stderr while that is a terminal, nothing otherwise."""
+    """A bar on stderr while that is a terminal; otherwise one line, if there is compiling to do."""
     layout = "{desc:<14} {percentage:3.0f}% |{bar}| {elapsed}"
-    with tqdm(total=100, disable=None, leave=False, bar_format=layout) as bar:
+    stages: list[str] = []
+    with tqdm(total=100, disable=None, leave=False, bar_format=layout, miniters=0) as bar:
 
         def report(stage: str, fraction: float) -> None:
+            if bar.disable and stage == COMPILING and stage not in stages:
+                print(f"photolin: {stage}", file=sys.stderr, flush=True)
             bar.set_description_str(stage, refresh=False)
             bar.update(100 * fraction - bar.n)
+            if stages[-1:] != [stage]:
+                stages.append(stage)
+                bar.refresh()
 
-        yield report
+        with tell_compiling(report) as progress:
+            yield progress
 
 
 def thresholds(result: Analysis) -> str:

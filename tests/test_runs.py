@@ -7,8 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from browser import wait_until
 from lambert import lambertian, wrap
+from numba import njit
 
 from photolin.analysis import Analysis, Cancel, Options, Progress
+from photolin.compiling import COMPILING
 from photolin.errors import Cancelled, DegenerateError
 from photolin.pipeline import analyze
 from photolin.stack import ImageStack
@@ -119,10 +121,24 @@ def test_what_cannot_be_solved_is_told_and_leaves_the_turn_to_the_next() -> None
 @pytest.mark.parametrize("given", [Options(), Options(T=0.3, Ts=0.3)])
 def test_suggested_thresholds_are_those_of_a_run_that_was_given_none(given: Options) -> None:
     stack = wrap(STACK.images)
-    assert Runs(stack, given).suggest(never) == analyze(stack, Options()).thresholds
+    assert Runs(stack, given).suggest(silent, never) == analyze(stack, Options()).thresholds
+
+
+def test_compiling_is_told_for_as_long_as_it_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+
+    def compile_first(*_: object, progress: Progress, cancel: Cancel) -> Analysis:
+        progress("coefficients", 0.0)
+        njit(lambda x: x + 1)(1)
+        return analyze(STACK, OPTIONS)
+
+    monkeypatch.setattr(module, "analyze", compile_first)
+    Runs(STACK, OPTIONS).run(OPTIONS, lambda stage, _: told.append(stage), never)
+    assert told[0] == told[-1] == "coefficients"
+    assert set(told[1:-1]) == {COMPILING}
 
 
 def test_a_suggestion_can_be_cancelled() -> None:
     stopping: Callable[[], bool] = lambda: True  # noqa: E731
     with pytest.raises(Cancelled):
-        Runs(STACK, Options()).suggest(stopping)
+        Runs(STACK, Options()).suggest(silent, stopping)

@@ -15,7 +15,8 @@ import photolin
 ROOT = Path(__file__).parent.parent
 
 FLOORS = (
-    ("errors", "factors", "stack", "analysis", "kernels", "blocks", "consensus", "sample"),
+    ("errors", "factors", "stack", "analysis", "compiling"),
+    ("kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
     ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds"),
     ("shape", "evaluate", "paper"),

@@ -6,9 +6,9 @@ from dataclasses import replace
 from threading import Lock
 
 from photolin.analysis import Analysis, Cancel, Options, Progress
+from photolin.compiling import tell_compiling
 from photolin.errors import Cancelled
 from photolin.factors import Thresholds
-from photolin.kernels import consensus_rows
 from photolin.pipeline import analyze
 from photolin.sample import draw_sample
 from photolin.stack import ImageStack
@@ -41,15 +41,14 @@ class Runs:
             return done
         with self._turn(progress, cancel):
             if (done := self._done.get(options)) is None:
-                if not consensus_rows.signatures:
-                    progress("compiling, once on this machine", 0.0)
-                done = analyze(self.stack, options, progress=progress, cancel=cancel)
+                with tell_compiling(progress) as told:
+                    done = analyze(self.stack, options, progress=told, cancel=cancel)
                 for oldest in list(self._done)[: len(self._done) + 1 - KEPT]:
                     del self._done[oldest]
                 self._done[options] = done
         return done
 
-    def suggest(self, cancel: Cancel) -> Thresholds:
+    def suggest(self, progress: Progress, cancel: Cancel) -> Thresholds:
         """Suggested T and Ts.
 
         Raises:
@@ -57,8 +56,10 @@ class Runs:
             Cancelled: `cancel` returned true.
         """
         free = replace(self.options, T=None, Ts=None)
-        sample = draw_sample(self.stack, free.seed)
-        return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
+        with tell_compiling(progress) as told:
+            told("finding thresholds", 0.5)
+            sample = draw_sample(self.stack, free.seed)
+            return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
 
     @contextmanager
     def _turn(self, progress: Progress, cancel: Cancel) -> Iterator[None]:

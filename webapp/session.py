@@ -188,8 +188,7 @@ class Session:
             self._thresholds.set(result.thresholds)
 
     def _set_suggested(self) -> None:
-        self._run.progress("finding thresholds", 0.5)
-        self._thresholds.set(self._runs.suggest(self._job.stopping))
+        self._thresholds.set(self._runs.suggest(self._run.progress, self._job.stopping))
 
     def _send(self, state: ViewState, kind: str, everything: bool) -> None:
         analysis = self._results.get(state.method)

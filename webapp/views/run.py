@@ -51,12 +51,12 @@ class RunView:
         """Show or hide the progress bar and Cancel."""
         for handle in (self._stage, self._bar, self._cancel):
             handle.visible = running
-        self._bar.value = 0
+        self.progress("", 0)
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show how far a run has come."""
+        """Show how far a run has come; the bar is never empty, so that it is seen to move."""
         self._stage.content = f'<div style="padding:0 1em;font-size:0.8em">{escape(stage)}</div>'
-        self._bar.value = round(100 * min(max(fraction, 0), 1))
+        self._bar.value = round(100 * min(max(fraction, 0.04), 1))
 
     def read(self, state: ViewState) -> ViewState:
         """The state with the method as set here."""
