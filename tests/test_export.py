@@ -339,6 +339,29 @@ def test_a_foreign_report_is_refused(saved: Path, text: str) -> None:
         load_result(saved)
 
 
+class Bomb:
+    """Leaves a mark where its pickle is loaded."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (Path.touch, (self.mark,))
+
+
+def test_a_result_runs_no_code_when_it_is_read(saved: Path, tmp_path: Path) -> None:
+    with np.load(saved / "result.npz") as archive:
+        arrays = dict(archive)
+    bomb = np.array([Bomb(tmp_path / "mark")], object)
+    np.savez(saved / "result.npz", allow_pickle=True, **arrays | {"lights": bomb})
+    digest = hashlib.sha256((saved / "result.npz").read_bytes()).hexdigest()
+    report = json.loads((saved / "report.json").read_text()) | {"result_sha256": digest}
+    (saved / "report.json").write_text(json.dumps(report))
+    with pytest.raises(InputError, match=r"result\.npz: is not a result of photolin"):
+        load_result(saved)
+    assert not (tmp_path / "mark").exists()
+
+
 RIGHT = [("title", "\ud800"), ("files", []), ("notes", [])]
 KEYS = ["options", "images", "files", "seconds", "title", "notes"]
 VALUES: list[object] = [None, 3, {"T": "high"}, [3], [], "\ud800"]

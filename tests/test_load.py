@@ -263,6 +263,12 @@ def test_a_mask_that_does_not_fit_is_named(folder: Path, mask: np.ndarray, words
         load_stack(folder)
 
 
+def test_a_mask_with_smooth_edges_begins_above_half_of_its_maximum(folder: Path) -> None:
+    mask = np.tile(np.array([0, 1, 50, 99, 100, 101, 150, 200], np.uint8), (H, 1))
+    png(folder / "mask.png", mask)
+    np.testing.assert_array_equal(load_stack(folder).mask, mask > 100)
+
+
 @pytest.mark.parametrize("pixels", [STACK[0, :-1], STACK[0].astype(np.uint16)])
 def test_a_dark_frame_that_does_not_fit_is_named(folder: Path, pixels: np.ndarray) -> None:
     png(folder / "dark.png", pixels)
