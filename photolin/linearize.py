@@ -25,6 +25,8 @@ def linearize(
     base_images: tuple[int, int, int],
     thresholds: Thresholds,
     options: Options,
+    white: NDArray[np.float32],
+    noise: float,
     threads: int | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from .analysis import Cancel
 from .errors import Cancelled, DegenerateError
-from .factorize import MIN_SCORE, NO_START, ROUGH_PIXELS, Factorization, fit_bases, orthogonalize
+from .factorize import (
+    MIN_SCORE,
+    NO_NOISE,
+    NO_START,
+    Factorization,
+    Noise,
+    fit_bases,
+    orthogonalize,
+)
 from .sample import Sample
 
 T_PER_NOISE = 1.8
@@ -25,8 +33,6 @@ FIRST_WIDTH = 0.03
 LAST_WIDTH = 5e-4
 """Below this, residuals of noise-free 16-bit images are rounding."""
 ROUNDS = 12
-EARLY = 4
-"""Rounds on a part of the sample: far from the noise, more pixels tell no more."""
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
 DAMPING = 1e-6
@@ -55,45 +61,42 @@ def refine_coefficients(
         DegenerateError: the observations do not determine coefficients.
         Cancelled: `cancel` said so.
     """
-    c, noise = orthogonalize(coefficients), FIRST_T / CUT
+    c, noise = orthogonalize(coefficients), Noise(FIRST_T / CUT, 0.0)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
-    few = sample.thin(ROUGH_PIXELS)
     for round_ in range(ROUNDS):
-        some = few if round_ < EARLY else sample
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
-        wanted = max(CUT * noise, MIN_T) if T is None else T
+        wanted = max(CUT * noise.relative, MIN_T) if T is None else T
         tolerance = max(min(wanted, FIRST_T), FIRST_T * 0.5**round_)
-        bases, score = fit_bases(some, c, tolerance, Ts, seed, limit)
-        noise = lower_noise(some.images, c, bases, tolerance, Ts)
-        width = max(2 * noise, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
-        weights = weigh(some, c, bases, score, tolerance, Ts, width)
+        bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
+        noise = measure_noise(sample.images, c, bases, tolerance, Ts)
+        width = max(2 * noise.relative, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
+        weights = weigh(sample, c, bases, score, tolerance, Ts, width)
         if not weights.any():
             raise DegenerateError(NO_START)
-        before, c = c, gauss_newton_step(some.pixels, weights, c)
+        before, c = c, gauss_newton_step(sample.pixels, weights, c)
         if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
             raise DegenerateError(NO_START)
         c = orthogonalize(c)
         # annealing goes on while it still changes the width, however little the coefficients move
-        still = some is sample and change_of_span(before, c) < STILL
-        if still and width <= max(2 * noise, LAST_WIDTH):
+        if change_of_span(before, c) < STILL and width <= max(2 * noise.relative, LAST_WIDTH):
             break
     return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
 
 def follow_noise(noise: float) -> float:
-    """T for a relative noise (standard deviation of (i - l)/i)."""
+    """T for a relative noise, the standard deviation of (i - l)/i."""
     return float(np.clip(T_PER_NOISE * noise, MIN_T, MAX_T))
 
 
-def lower_noise(
+def measure_noise(
     images: NDArray[np.float32],
     coefficients: NDArray[np.float64],
     bases: NDArray[np.float32],
     T: float,
     Ts: float,
-) -> float:
-    """Standard deviation of (i - l)/i among D observations with i < l, where no highlight can be.
+) -> Noise:
+    """Noise of the D observations with i < l.
 
     Args:
         images: (K,M)
@@ -101,11 +104,20 @@ def lower_noise(
         bases: (3,M), NaN where unknown.
     """
     l = coefficients.astype(np.float32) @ bases
-    with np.errstate(invalid="ignore", divide="ignore"):
-        short = (l - images) / images
-    short = short[(images >= Ts) & (short > 0) & (short <= T)]
-    # the median of a half-normal is 0.6745 standard deviations
-    return float(np.median(short) / 0.6745) if short.size else 0.0
+    with np.errstate(invalid="ignore"):
+        short = l - images
+        counted = (images >= Ts) & (short > 0) & (short <= T * images)
+    if not counted.any():
+        return NO_NOISE
+    short, i = short[counted], images[counted]
+    # T i cuts off the noise of dim observations, but not that of bright ones
+    bright = i >= np.median(i)
+    return Noise(half_normal(short / i), half_normal(short[bright]))
+
+
+def half_normal(deviations: NDArray[np.float32]) -> float:
+    """Standard deviation of the normal distribution of whose one side these are."""
+    return float(np.median(deviations) / 0.6745)
 
 
 def weigh(
@@ -145,15 +157,13 @@ def gauss_newton_step(
     b = (inverse @ ((w * x) @ c)[:, :, None])[:, :, 0]
     gradient = (w * (x - b @ c.T)).T @ b
     # b follows c: what a change of c moves within the span of c does not count
-    # the Hessian only says which way to step: float32 is enough, and twice as fast
-    spanned = np.linalg.cholesky(inverse).transpose(0, 2, 1) @ c.T * w[:, None, :]
-    spanned = spanned.astype(np.float32).reshape(-1, K)
+    spanned = w[:, :, None] * (c @ np.linalg.cholesky(inverse))
+    spanned = spanned.transpose(0, 2, 1).reshape(-1, K)
     hessian = np.empty((K, 3, K, 3))
     for i in range(3):
         for j in range(i, 3):
             both = b[:, i] * b[:, j]
-            repeated = np.repeat(both.astype(np.float32), 3)[:, None]
-            block = np.diag(both @ w) - spanned.T @ (repeated * spanned)
+            block = np.diag(both @ w) - spanned.T @ (np.repeat(both, 3)[:, None] * spanned)
             hessian[:, i, :, j] = block
             hessian[:, j, :, i] = block.T
     hessian = hessian.reshape(3 * K, 3 * K)

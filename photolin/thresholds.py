@@ -14,7 +14,7 @@ from .factorize import (
     search_coefficients,
 )
 from .factors import Thresholds
-from .refine import follow_noise, lower_noise, refine_coefficients
+from .refine import follow_noise, measure_noise, refine_coefficients
 from .sample import Sample
 
 FIRST_T = 0.05
@@ -38,12 +38,12 @@ class Suggestion:
     """(LEVELS/2,) observations in bins of `bin_width` from 0, single images' own peaks left out."""
     bin_width: float
     """Fraction of full scale."""
-    noise: float
-    """Standard deviation of (i - l)/i below the fit, where no highlight can be."""
+    offset: float
+    """Gray level of the darkest shadows, fraction of full scale; 0 where they are black."""
     starts: tuple[tuple[int, int, int], ...]
     """Choices of base images, best first."""
-    coefficients: NDArray[np.float64] | None
-    """(K,3) of the provisional linearization; None where T was given."""
+    found: Factorization | None
+    """The linearization of the sample that shows the noise; None where nothing asked for it."""
 
 
 def suggest_thresholds(
@@ -56,7 +56,7 @@ def suggest_thresholds(
 
     Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T is
     a multiple of the noise seen on the negative side (i < l) of D residuals, where highlights
-    cannot be, after a provisional linearization.
+    cannot be, after linearizing the sample.
 
     Args:
         lights: (K,3) where known; coefficients are then not estimated.
@@ -68,20 +68,16 @@ def suggest_thresholds(
     Ts = options.Ts if options.Ts is not None else round(bin_width * shadow_bins(histogram), 4)
     starts = find_starts(sample, Ts, options, lights)
     T, found = options.T, None
+    if T is None or options.method == "robust":
+        found = linearize_sample(sample, starts, Ts, options, lights, cancel)
     if T is None:
-        found = provisional(sample, starts, Ts, options, lights, cancel)
-        T = round(follow_noise(found.noise), 4)
-    return Suggestion(
-        Thresholds(T, Ts),
-        histogram,
-        bin_width,
-        0.0 if found is None else found.noise,
-        tuple(starts),
-        None if found is None else found.coefficients,
-    )
+        assert found is not None
+        T = round(follow_noise(found.noise.relative), 4)
+    offset = bin_width * offset_bins(histogram)
+    return Suggestion(Thresholds(T, Ts), histogram, bin_width, offset, tuple(starts), found)
 
 
-def provisional(
+def linearize_sample(
     sample: Sample,
     starts: list[tuple[int, int, int]],
     Ts: float,
@@ -89,20 +85,20 @@ def provisional(
     lights: NDArray[np.float64] | None,
     cancel: Cancel | None,
 ) -> Factorization:
-    """A factorization with the noise that shows in it."""
-    seed, limit = options.seed, options.samples
+    """Coefficients (those of the lights, where known) and bases of the sample, and the noise."""
+    T, seed, limit = options.T, options.seed, options.samples
     if lights is None:
-        first = Thresholds(FIRST_T, Ts)
+        first = Thresholds(FIRST_T if T is None else T, Ts)
         rough = search_coefficients(sample, starts, first, seed, limit, cancel)
-        return refine_coefficients(sample, rough, None, Ts, seed, limit, cancel)
+        return refine_coefficients(sample, rough, T, Ts, seed, limit, cancel)
     c = orthogonalize(lights)
 
-    def at(T: float) -> Factorization:
-        bases, score = fit_bases(sample, c, T, Ts, seed, limit)
-        noise = lower_noise(sample.images, c, bases, T, Ts)
+    def at(tolerance: float) -> Factorization:
+        bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
+        noise = measure_noise(sample.images, c, bases, tolerance, Ts)
         return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
-    return at(follow_noise(at(FIRST_T).noise))
+    return at(follow_noise(at(FIRST_T).noise.relative) if T is None else T)
 
 
 def find_starts(
@@ -125,6 +121,21 @@ def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], fl
     # exact zeros are left out: noise clipped at zero piles up there and hides the mode's width
     rows = [np.histogram(image[image > 0], bins)[0] for image in images]
     return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64), bin_width
+
+
+def offset_bins(histogram: NDArray[np.float64]) -> float:
+    """Bins of `dark_histogram` below the shadows' own level: light that all images share.
+
+    Shadows around a level that is not zero leave the bins below it empty on both sides of the
+    mode; noise clipped at zero does not.
+    """
+    smooth = np.convolve(np.pad(histogram, 2), SMOOTHING, mode="valid")
+    grays = np.median(smooth[GRAYS])
+    peak = int(np.argmax(smooth[:CEILING]))
+    below = smooth[: max(peak - 1, 0)]
+    if smooth[peak] <= 2 * grays or not below.size or below.min() > 0.5 * smooth[peak]:
+        return 0.0
+    return peak + 0.5
 
 
 def shadow_bins(histogram: NDArray[np.float64]) -> int:

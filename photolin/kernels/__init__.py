@@ -14,7 +14,8 @@ of every candidate: only lit observations are ever compared.
 """
 
 from .consensus import consensus_rows
+from .evidence import evidence_rows
 from .labels import label_rows
 from .samples import centre_rows, support_rows
 
-__all__ = ["centre_rows", "consensus_rows", "label_rows", "support_rows"]
+__all__ = ["centre_rows", "consensus_rows", "evidence_rows", "label_rows", "support_rows"]

@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+MIN_WEIGHT = 3.5
+"""Sum of weights below which a weighted fit would follow single observations."""
 UNFIT = -(2**30)
 """Score of no candidate at all."""
 
@@ -91,6 +93,42 @@ def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
+def _polish(x, a0, a1, a2, n, reach, v):  # pragma: no cover
+    """Weighted least squares on all lit observations, from v, into v.
+
+    Weights are Tukey's biweight of the residual, zero from `reach` on: T i would drop dim
+    observations that noise has moved, and keep the tails of highlights.
+    """
+    w = np.empty(3, np.float64)
+    G = np.empty((3, 3))
+    h = np.empty(3)
+    for _ in range(3):
+        G[:] = 0
+        h[:] = 0
+        weight = 0.0
+        for m in range(n):
+            excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
+            u = 1 - (excess / reach) ** 2
+            if u <= 0:
+                continue
+            u *= u
+            weight += u
+            b0, b1, b2 = u * a0[m], u * a1[m], u * a2[m]
+            G[0, 0] += b0 * a0[m]
+            G[0, 1] += b0 * a1[m]
+            G[0, 2] += b0 * a2[m]
+            G[1, 1] += b1 * a1[m]
+            G[1, 2] += b1 * a2[m]
+            G[2, 2] += b2 * a2[m]
+            h[0] += b0 * x[m]
+            h[1] += b1 * x[m]
+            h[2] += b2 * x[m]
+        if weight < MIN_WEIGHT or not _solve(G, h, w):
+            return
+        v[0], v[1], v[2] = w[0], w[1], w[2]
+
+
+@njit(nogil=True, cache=True)
 def _sample(x, a0, a1, a2, n, state, out):  # pragma: no cover
     """Exact fit to three random observations; false where their factors lie near a plane."""
     state, r0 = _next(state)
@@ -125,12 +163,21 @@ def _sample(x, a0, a1, a2, n, state, out):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
-    """Best v of n lit observations into `best`; returns its score, or UNFIT.
+def _differ(v, w):  # pragma: no cover
+    """Whether two solutions are farther apart than a tenth of the larger one."""
+    apart = (v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2
+    size = max(v[0] ** 2 + v[1] ** 2 + v[2] ** 2, w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+    return apart > 0.01 * size
 
-    `best` holds a first guess, or NaN; `tries` as in `consensus_rows`.
+
+@njit(nogil=True, cache=True)
+def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
+    """Best v of n lit observations into `best`; returns its score, or UNFIT, and the runner-up's.
+
+    `best` holds a first guess, or NaN; `tries` as in `consensus_rows`. The runner-up is the best
+    scored solution that differs from the winner.
     """
-    score, diffuse, misfit = UNFIT, 0, 0.0
+    score, diffuse, misfit, second = UNFIT, 0, 0.0, UNFIT
     v = np.empty(3, np.float32)
     w = np.empty(3, np.float64)
     if np.isfinite(best[0]):
@@ -145,9 +192,13 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
         for step in range(3):
             s, d = _score(x, a0, a1, a2, n, v, T)
             if s < score:
+                if s > second and _differ(v, best):
+                    second = s
                 break
             e = _misfit(x, a0, a1, a2, n, v, T)
             if s > score or e < misfit:
+                if score > second and _differ(v, best):
+                    second = score
                 score, diffuse, misfit = s, d, e
                 best[:] = v
             elif step > 0:
@@ -161,12 +212,12 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
         if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
             best[0], best[1], best[2] = w[0], w[1], w[2]
             score, _ = _score(x, a0, a1, a2, n, best, T)
-    return score
+    return score, second
 
 
 @njit(nogil=True, cache=True)
 def consensus_rows(
-    X, columns, A, T, Ts, tries, limit, seed, out, score, start, stop
+    X, columns, A, white, T, Ts, reach, tries, limit, seed, out, score, margin, start, stop
 ):  # pragma: no cover
     """Fit rows start..stop by adaptive sample consensus.
 
@@ -174,12 +225,16 @@ def consensus_rows(
         X: (M,N) float32 observations; row r of the problem is column `columns[r]` of X.
         columns: (R,) int64.
         A: (3,M) float32 factors; an observation whose factors are NaN is left out.
+        white: (M,) float32; an observation from there on is saturated and left out.
         T, Ts: float32 thresholds.
+        reach: float32, residual from which an observation has no weight in the last fit; 0: none.
         tries: (n,) int64 samples needed against the share of D among the lit, 0 to 1.
         limit: the most samples to draw.
         seed: uint64; each row draws its own sequence from it and its column number.
         out: (R,3) float32; first guess (or NaN) in, winner out; NaN where fewer than 3 are lit.
         score: (R,) int32, written: D - U among the lit.
+        margin: (R,) int32, written: score above that of the best different solution seen, 0 where
+            nothing was fitted.
     """
     M = X.shape[0]
     x = np.empty(M, np.float32)
@@ -191,14 +246,18 @@ def consensus_rows(
         n = 0
         for m in range(M):
             value = X[m, column]
-            if value >= Ts and value > 0 and np.isfinite(A[0, m]):
+            if value >= Ts and 0 < value < white[m] and np.isfinite(A[0, m]):
                 x[n], a0[n], a1[n], a2[n] = value, A[0, m], A[1, m], A[2, m]
                 n += 1
         if n < 3:
             out[r] = np.nan
             score[r] = UNFIT
+            margin[r] = 0
             continue
         state = np.uint64(seed) ^ (np.uint64(column) * np.uint64(0xD1342543DE82EF95))
-        score[r] = _fit(x, a0, a1, a2, n, T, tries, limit, state, out[r])
+        score[r], second = _fit(x, a0, a1, a2, n, T, tries, limit, state, out[r])
+        margin[r] = max(0, score[r] - max(second, -n))
         if score[r] == UNFIT:
             out[r] = np.nan
+        elif reach > 0:
+            _polish(x, a0, a1, a2, n, reach, out[r])
