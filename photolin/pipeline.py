@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
+from .confidence import find_doubts, measure_confidence
 from .errors import DegenerateError, OptionError
-from .factorize import search_coefficients
 from .label import label_images
-from .linearize import linearize
-from .refine import refine_coefficients
-from .sample import Sample, draw_sample
+from .linearize import Quality, linearize
+from .sample import draw_sample
+from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
 
@@ -48,15 +48,18 @@ def analyze(
     seconds: dict[str, float] = {}
 
     with timed("thresholds", seconds, progress):
-        sample = draw_sample(stack, options.seed)
+        white = find_white(stack)
+        sample = draw_sample(stack, options.seed, white)
         suggestion = suggest_thresholds(sample, options, stack.lights, cancel)
     thresholds, base_images = suggestion.thresholds, suggestion.starts[0]
+    found = suggestion.found
+    quality = Quality(white, 0.0 if found is None else found.noise.absolute)
 
     with timed("coefficients", seconds, progress):
         if stack.lights is not None:
             coefficients = stack.lights
-        elif options.method == "robust":
-            coefficients = robust_coefficients(sample, suggestion, options, cancel)
+        elif options.method == "robust" and found is not None:
+            coefficients = found.coefficients
         else:
             coefficients = estimate_coefficients(
                 stack, base_images, thresholds, options, threads, progress, cancel
@@ -64,14 +67,31 @@ def analyze(
         coefficients = relate_to_bases(coefficients, base_images)
 
     with timed("linearize", seconds, progress):
-        bases = linearize(
-            stack, coefficients, base_images, thresholds, options, threads, progress, cancel
+        bases, margin = linearize(
+            stack,
+            coefficients,
+            base_images,
+            thresholds,
+            options,
+            quality,
+            threads,
+            progress,
+            cancel,
         )
 
     with timed("classify", seconds, progress):
         labels = label_images(
             stack.images, bases, coefficients, stack.mask, thresholds, threads=threads
         )
+
+    with timed("confidence", seconds, progress):
+        confidence = measure_confidence(
+            stack, coefficients, bases, labels, margin, thresholds, quality, threads
+        )
+        doubts = [
+            *doubt_blackness(suggestion),
+            *find_doubts(stack, confidence, found, thresholds),
+        ]
 
     return Analysis(
         options=options,
@@ -87,7 +107,8 @@ def analyze(
         lights=stack.lights,
         files=stack.files,
         notes=(*stack.notes, *describe_choices(options, suggestion)),
-        warnings=(*stack.warnings, *find_doubts(bases, stack)),
+        confidence=confidence,
+        warnings=(*stack.warnings, *doubts),
     )
 
 
@@ -109,17 +130,6 @@ def check_base_images(options: Options, stack: ImageStack) -> None:
             f"base_images is {options.base_images}; {stack.title} has images 0 to "
             f"{len(stack.images) - 1}"
         )
-
-
-def robust_coefficients(
-    sample: Sample, suggestion: Suggestion, options: Options, cancel: Cancel | None
-) -> NDArray[np.float64]:
-    """(K,3) on the sample; suggesting T has found them already."""
-    if suggestion.coefficients is not None:
-        return suggestion.coefficients
-    t, seed, limit = suggestion.thresholds, options.seed, options.samples
-    rough = search_coefficients(sample, suggestion.starts, t, seed, limit, cancel)
-    return refine_coefficients(sample, rough, t.T, t.Ts, seed, limit, cancel).coefficients
 
 
 def relate_to_bases(
@@ -144,10 +154,9 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     """Sentences on what was chosen because it was not given."""
     t = suggestion.thresholds
     notes = []
-    if options.T is None:
-        notes.append(
-            f"T = {t.T:g} suggested: from the noise below the fit, {suggestion.noise:.4f} of i"
-        )
+    if options.T is None and suggestion.found is not None:
+        noise = suggestion.found.noise.relative
+        notes.append(f"T = {t.T:g} suggested: from the noise below the fit, {noise:.4f} of i")
     if options.Ts is None:
         notes.append(f"Ts = {t.Ts:g} suggested: the upper end of the shadows' gray levels")
     if options.base_images is None:
@@ -157,12 +166,11 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     return notes
 
 
-def find_doubts(bases: NDArray[np.float32], stack: ImageStack) -> list[str]:
-    """Sentences on what the result cannot tell."""
-    undetermined = int(np.isnan(bases[0]).sum())
-    if undetermined == 0:
+def doubt_blackness(suggestion: Suggestion) -> list[str]:
+    """Whether a constant light lies on all images, as ambient light or a camera's black level do."""
+    if suggestion.offset == 0:
         return []
     return [
-        f"{undetermined} of {len(stack.pixels)} pixels are lit in fewer than three images "
-        "and stay undetermined"
+        f"shadows are not black but {suggestion.offset:.4f} of full scale: ambient light or a black "
+        f"level; subtract it with the option offset ({suggestion.offset:.4f}) or a dark frame"
     ]

@@ -1,6 +1,5 @@
 """How much each pixel's linearized bases rest on."""
 
-import numpy as np
 from numba import njit
 
 

@@ -1,0 +1,168 @@
+"""How far a result can be trusted: pixel by pixel, image by image, and as a whole."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Confidence
+from .blocks import run_blocks
+from .factorize import Factorization, orthogonalize
+from .factors import Factor, Thresholds
+from .kernels import evidence_rows
+from .linearize import Quality
+from .stack import ImageStack
+
+BLOCK = 1 << 14
+FEW = 4
+"""Lit images below which three observations fit whatever they are."""
+MISFIT = 0.15
+"""Share of lit pixels by which an image may fit worse than the median image."""
+GAIN = 0.05
+"""Change of exposure, against known light powers, that is worth a word."""
+SATURATED = 0.05
+FLATNESS = 4.0
+"""Third dimension of the stack, in units of the noise, below which it is hardly there."""
+
+
+def measure_confidence(
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    bases: NDArray[np.float32],
+    labels: NDArray[np.uint8],
+    margin: NDArray[np.int32],
+    thresholds: Thresholds,
+    quality: Quality,
+    threads: int | None = None,
+) -> Confidence:
+    """What each pixel and each image rests on.
+
+    Args:
+        coefficients: (K,3)
+        bases: (3,H,W)
+        labels: (K,H,W)
+        margin: (P,) of `linearize`.
+    """
+    K, H, W = stack.shape
+    P = len(stack.pixels)
+    X, flat = stack.images.reshape(K, -1), labels.reshape(K, -1)
+    A = np.ascontiguousarray(orthogonalize(coefficients).T, np.float32)
+    lit, diffuse = np.empty(P, np.uint16), np.empty(P, np.uint16)
+    spread, Ts = np.empty(P, np.float32), np.float32(thresholds.Ts)
+
+    def work(start: int, stop: int) -> None:
+        evidence_rows(
+            X, flat, stack.pixels, A, quality.white, Ts, lit, diffuse, spread, start, stop
+        )
+
+    run_blocks(work, P, BLOCK, threads=threads)
+
+    def paint(values: NDArray) -> NDArray:
+        image = np.zeros(H * W, values.dtype)
+        image[stack.pixels] = values
+        return image.reshape(H, W)
+
+    step = max(1, P // 20_000)
+    some = stack.pixels[::step]
+    support, residual, gain = judge_images(
+        X[:, some], coefficients @ bases.reshape(3, -1)[:, some], flat[:, some], thresholds
+    )
+    return Confidence(
+        lit=paint(lit),
+        diffuse=paint(diffuse),
+        margin=paint(np.minimum(margin, np.iinfo(np.uint16).max).astype(np.uint16)),
+        spread=paint(spread),
+        support=support,
+        residual=residual,
+        gain=gain,
+        saturated=(X[:, some] >= quality.white[:, None]).mean(axis=1),
+    )
+
+
+def judge_images(
+    i: NDArray[np.float32],
+    l: NDArray[np.float64],
+    labels: NDArray[np.uint8],
+    thresholds: Thresholds,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Support, residual and gain of each image, from some pixels.
+
+    Args:
+        i: (K,M) input.
+        l: (K,M) linearized.
+        labels: (K,M)
+
+    Returns:
+        (K,) share of D among the lit pixels that face the light; (K,) median of |i - l|/i and (K,)
+        median of i/l there. 0, 0 and 1 for an image without such pixels.
+    """
+    support, residual, gain = np.zeros(len(i)), np.zeros(len(i)), np.ones(len(i))
+    for k in range(len(i)):
+        faced = (i[k] >= max(thresholds.Ts, 1e-9)) & (l[k] > 0)
+        if faced.any():
+            a, b = i[k, faced], l[k, faced]
+            support[k] = (labels[k, faced] == Factor.DIFFUSE).mean()
+            residual[k] = np.median(np.abs(a - b) / a)
+            gain[k] = np.median(a / b)
+    return support, residual, gain
+
+
+def find_doubts(
+    stack: ImageStack, confidence: Confidence, found: Factorization | None, thresholds: Thresholds
+) -> list[str]:
+    """Sentences on what is wrong or cannot be told, each with the number that says so."""
+    mask = stack.mask
+    few, unlit = confidence.lit[mask] < FEW, confidence.lit[mask] < 3
+    doubts = []
+    if unlit.any():
+        doubts.append(
+            f"{unlit.sum()} of {unlit.size} pixels are lit in fewer than three images (i >= Ts = "
+            f"{thresholds.Ts:g}) and stay undetermined"
+        )
+    if few.mean() > 0.2:
+        doubts.append(
+            f"{100 * few.mean():.0f} % of the pixels are lit in fewer than {FEW} images, so that "
+            "nothing checks their linearized values; more images would"
+        )
+    doubts += doubt_images(stack, confidence)
+    if found is not None:
+        doubts += doubt_dimensions(found)
+    return doubts
+
+
+def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
+    """Images that do not fit the others."""
+    doubts = []
+    support, gain = confidence.support, confidence.gain
+    usual = np.median(support)
+    slack = max(MISFIT, 5 * float(np.median(np.abs(support - usual))))
+    for k in np.flatnonzero(support < usual - slack):
+        doubts.append(
+            f"image {k} ({stack.names[k]}) does not fit the others: {100 * support[k]:.0f} % of "
+            f"its lit pixels agree, {100 * usual:.0f} % of the median image's; moved camera, wrong "
+            "light or wrong order are possible"
+        )
+    if stack.lights is not None:
+        slack = max(GAIN, 5 * float(np.median(np.abs(gain - np.median(gain)))))
+        for k in np.flatnonzero(np.abs(gain / np.median(gain) - 1) > slack):
+            doubts.append(
+                f"image {k} ({stack.names[k]}) is {gain[k] / np.median(gain):.2f} times as bright as "
+                "its light power says; another exposure or a flickering light are possible"
+            )
+    share = confidence.saturated.mean()
+    if share > SATURATED:
+        doubts.append(
+            f"{100 * share:.0f} % of the observations are saturated and have no say; shorten the "
+            "exposure"
+        )
+    return doubts
+
+
+def doubt_dimensions(found: Factorization) -> list[str]:
+    """Whether the linearized sample really has three dimensions."""
+    b = found.bases[:, np.isfinite(found.bases[0])].astype(np.float64)
+    third = float(np.linalg.svd(b, compute_uv=False)[2] / np.sqrt(b.shape[1]))
+    if third >= FLATNESS * found.noise.absolute:
+        return []
+    return [
+        f"the stack hardly has three dimensions: the third is {third:.4f} of full scale, the noise "
+        f"{found.noise.absolute:.4f}; the lights may lie near a plane, or the scene may be flat"
+    ]
