@@ -144,8 +144,8 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
         slack = max(GAIN, 5 * float(np.median(np.abs(gain - np.median(gain)))))
         for k in np.flatnonzero(np.abs(gain / np.median(gain) - 1) > slack):
             doubts.append(
-                f"image {k} ({stack.names[k]}) is {gain[k] / np.median(gain):.2f} times as bright as "
-                "its light power says; another exposure or a flickering light are possible"
+                f"image {k} ({stack.names[k]}) is {gain[k] / np.median(gain):.2f} times as bright "
+                "as its light power says; another exposure or a flickering light are possible"
             )
     share = confidence.saturated.mean()
     if share > SATURATED:

@@ -9,7 +9,7 @@ from .blocks import run_blocks
 from .kernels import consensus_rows
 
 BLOCK = 10_000
-CONFIDENCE = 0.999
+CONFIDENCE = 0.99
 """Wanted probability that at least one sample held D observations only."""
 
 

@@ -43,9 +43,11 @@ class Noise:
     """Standard deviation of (i - l)/i."""
     absolute: float
     """Standard deviation of i - l in the brighter half, fraction of full scale."""
+    tail: float
+    """(l - i)/i that few exceed, see `refine.WITHIN`; noise need not be normal."""
 
 
-NO_NOISE = Noise(0.0, 0.0)
+NO_NOISE = Noise(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

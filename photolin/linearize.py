@@ -17,7 +17,7 @@ from .stack import ImageStack
 
 BLOCK = 4096
 
-REACH = 4.5
+REACH = 4.0
 """Residual, in units of the noise, from which an observation has no weight in the last fit."""
 LEAST_REACH = 0.003
 """The least such residual, as a share of the brightest grays."""

@@ -155,8 +155,11 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     t = suggestion.thresholds
     notes = []
     if options.T is None and suggestion.found is not None:
-        noise = suggestion.found.noise.relative
-        notes.append(f"T = {t.T:g} suggested: from the noise below the fit, {noise:.4f} of i")
+        noise = 100 * suggestion.found.noise.relative
+        notes.append(
+            f"T = {t.T:g} suggested: lets pass nearly all noise, whose standard deviation is "
+            f"{noise:.2f} % of the intensity; raise T if diffuse areas are speckled"
+        )
     if options.Ts is None:
         notes.append(f"Ts = {t.Ts:g} suggested: the upper end of the shadows' gray levels")
     if options.base_images is None:
@@ -167,10 +170,10 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
 
 
 def doubt_blackness(suggestion: Suggestion) -> list[str]:
-    """Whether a constant light lies on all images, as ambient light or a camera's black level do."""
+    """Whether a constant lies on all images, as of ambient light or a camera's black level."""
     if suggestion.offset == 0:
         return []
     return [
-        f"shadows are not black but {suggestion.offset:.4f} of full scale: ambient light or a black "
-        f"level; subtract it with the option offset ({suggestion.offset:.4f}) or a dark frame"
+        f"shadows are not black but {suggestion.offset:.4f} of full scale: ambient light or a "
+        f"black level; subtract it with the option offset ({suggestion.offset:.4f}) or a dark frame"
     ]

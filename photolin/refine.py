@@ -16,6 +16,7 @@ from .factorize import (
     MIN_SCORE,
     NO_NOISE,
     NO_START,
+    ROUGH_PIXELS,
     Factorization,
     Noise,
     fit_bases,
@@ -23,9 +24,10 @@ from .factorize import (
 )
 from .sample import Sample
 
-T_PER_NOISE = 1.8
-"""Trades diffuse pixels lost to noise against highlights lost to T: the best mean of both."""
-MIN_T, MAX_T = 0.008, 0.12
+WITHIN = 0.93
+"""Share of the noise that the suggested T lets pass (1.8 standard deviations of a normal one). It
+trades diffuse pixels lost to noise against highlights lost to T, for the best mean of both."""
+MIN_T, MAX_T = 0.01, 0.12
 FIRST_T = 0.1
 CUT = 3.0
 """Residual, in units of the noise, beyond which an observation is no longer diffuse in the fit."""
@@ -33,6 +35,8 @@ FIRST_WIDTH = 0.03
 LAST_WIDTH = 5e-4
 """Below this, residuals of noise-free 16-bit images are rounding."""
 ROUNDS = 12
+EARLY = 4
+"""Rounds on a part of the sample: far from the noise, more pixels tell no more."""
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
 DAMPING = 1e-6
@@ -61,32 +65,35 @@ def refine_coefficients(
         DegenerateError: the observations do not determine coefficients.
         Cancelled: `cancel` said so.
     """
-    c, noise = orthogonalize(coefficients), Noise(FIRST_T / CUT, 0.0)
+    c, noise = orthogonalize(coefficients), Noise(FIRST_T / CUT, 0.0, FIRST_T)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
+    few = sample.thin(ROUGH_PIXELS)
     for round_ in range(ROUNDS):
+        some = few if round_ < EARLY else sample
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
         wanted = max(CUT * noise.relative, MIN_T) if T is None else T
         tolerance = max(min(wanted, FIRST_T), FIRST_T * 0.5**round_)
-        bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
-        noise = measure_noise(sample.images, c, bases, tolerance, Ts)
+        bases, score = fit_bases(some, c, tolerance, Ts, seed, limit)
+        noise = measure_noise(some.images, c, bases, tolerance, Ts)
         width = max(2 * noise.relative, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
-        weights = weigh(sample, c, bases, score, tolerance, Ts, width)
+        weights = weigh(some, c, bases, score, tolerance, Ts, width)
         if not weights.any():
             raise DegenerateError(NO_START)
-        before, c = c, gauss_newton_step(sample.pixels, weights, c)
+        before, c = c, gauss_newton_step(some.pixels, weights, c)
         if not np.isfinite(c).all() or np.linalg.cond(c) > 1e4:
             raise DegenerateError(NO_START)
         c = orthogonalize(c)
         # annealing goes on while it still changes the width, however little the coefficients move
-        if change_of_span(before, c) < STILL and width <= max(2 * noise.relative, LAST_WIDTH):
+        still = some is sample and change_of_span(before, c) < STILL
+        if still and width <= max(2 * noise.relative, LAST_WIDTH):
             break
     return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
 
-def follow_noise(noise: float) -> float:
-    """T for a relative noise, the standard deviation of (i - l)/i."""
-    return float(np.clip(T_PER_NOISE * noise, MIN_T, MAX_T))
+def follow_noise(noise: Noise) -> float:
+    """T that lets all but the tail of the noise pass."""
+    return float(np.clip(noise.tail, MIN_T, MAX_T))
 
 
 def measure_noise(
@@ -106,13 +113,16 @@ def measure_noise(
     l = coefficients.astype(np.float32) @ bases
     with np.errstate(invalid="ignore"):
         short = l - images
-        counted = (images >= Ts) & (short > 0) & (short <= T * images)
+        below = (images >= Ts) & (short > 0) & (short <= FIRST_T * images)
+    short, i = short[below], images[below]
+    counted = short <= T * i
     if not counted.any():
         return NO_NOISE
-    short, i = short[counted], images[counted]
+    tail = float(np.quantile(short / i, WITHIN))
+    short, i = short[counted], i[counted]
     # T i cuts off the noise of dim observations, but not that of bright ones
     bright = i >= np.median(i)
-    return Noise(half_normal(short / i), half_normal(short[bright]))
+    return Noise(half_normal(short / i), half_normal(short[bright]), tail)
 
 
 def half_normal(deviations: NDArray[np.float32]) -> float:
@@ -157,13 +167,15 @@ def gauss_newton_step(
     b = (inverse @ ((w * x) @ c)[:, :, None])[:, :, 0]
     gradient = (w * (x - b @ c.T)).T @ b
     # b follows c: what a change of c moves within the span of c does not count
-    spanned = w[:, :, None] * (c @ np.linalg.cholesky(inverse))
-    spanned = spanned.transpose(0, 2, 1).reshape(-1, K)
+    # the Hessian only says which way to step: float32 is enough, and twice as fast
+    spanned = np.linalg.cholesky(inverse).transpose(0, 2, 1) @ c.T * w[:, None, :]
+    spanned = spanned.astype(np.float32).reshape(-1, K)
     hessian = np.empty((K, 3, K, 3))
     for i in range(3):
         for j in range(i, 3):
             both = b[:, i] * b[:, j]
-            block = np.diag(both @ w) - spanned.T @ (np.repeat(both, 3)[:, None] * spanned)
+            repeated = np.repeat(both.astype(np.float32), 3)[:, None]
+            block = np.diag(both @ w) - spanned.T @ (repeated * spanned)
             hessian[:, i, :, j] = block
             hessian[:, j, :, i] = block.T
     hessian = hessian.reshape(3 * K, 3 * K)

@@ -29,7 +29,7 @@ def find_white(stack: ImageStack) -> NDArray[np.float32]:
             white[k] = 1
             continue
         near = values[values >= 0.97 * top]
-        levels, counts = np.unique(near, return_counts=True)
+        counts = np.unique(near, return_counts=True)[1]
         if counts[-1] >= PILE and counts[-1] > STEEP * counts[-6:-1].sum():
             white[k] = top
     return white

@@ -54,9 +54,9 @@ def suggest_thresholds(
 ) -> Suggestion:
     """Thresholds for a stack; T or Ts given in `options` are kept.
 
-    Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T is
-    a multiple of the noise seen on the negative side (i < l) of D residuals, where highlights
-    cannot be, after linearizing the sample.
+    Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T lets
+    pass all but the tail of the residuals seen below the fit (i < l), where highlights cannot be,
+    after linearizing the sample.
 
     Args:
         lights: (K,3) where known; coefficients are then not estimated.
@@ -72,7 +72,7 @@ def suggest_thresholds(
         found = linearize_sample(sample, starts, Ts, options, lights, cancel)
     if T is None:
         assert found is not None
-        T = round(follow_noise(found.noise.relative), 4)
+        T = round(follow_noise(found.noise), 4)
     offset = bin_width * offset_bins(histogram)
     return Suggestion(Thresholds(T, Ts), histogram, bin_width, offset, tuple(starts), found)
 
@@ -98,7 +98,7 @@ def linearize_sample(
         noise = measure_noise(sample.images, c, bases, tolerance, Ts)
         return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
-    return at(follow_noise(at(FIRST_T).noise.relative) if T is None else T)
+    return at(follow_noise(at(FIRST_T).noise) if T is None else T)
 
 
 def find_starts(

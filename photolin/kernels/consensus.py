@@ -5,6 +5,8 @@ from numba import njit
 
 MIN_WEIGHT = 3.5
 """Sum of weights below which a weighted fit would follow single observations."""
+SUMS = {"reassoc", "nsz"}
+"""Lets sums be taken in vectors; nothing else of IEEE arithmetic is given up."""
 UNFIT = -(2**30)
 """Score of no candidate at all."""
 
@@ -39,60 +41,59 @@ def _score(x, a0, a1, a2, n, v, T):  # pragma: no cover
     return diffuse - against, diffuse
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, fastmath=SUMS)
 def _misfit(x, a0, a1, a2, n, v, T):  # pragma: no cover
     """Sum over D of ((i - l) / (T i))^2: settles equal scores."""
-    total = 0.0
+    v0, v1, v2 = v[0], v[1], v[2]
+    total = np.float32(0)
     for m in range(n):
-        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
-        slack = T * x[m]
-        if abs(excess) <= slack and slack > 0:
-            total += (excess / slack) ** 2
+        excess = x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)
+        share = excess / (T * x[m])
+        total += share * share if abs(share) <= 1 else np.float32(0)
     return total
 
 
 @njit(nogil=True, cache=True)
-def _solve(G, h, out):  # pragma: no cover
-    """out = inverse(G) h for symmetric 3x3 float64 G; false where G is singular."""
-    c00 = G[1, 1] * G[2, 2] - G[1, 2] * G[1, 2]
-    c01 = G[0, 2] * G[1, 2] - G[0, 1] * G[2, 2]
-    c02 = G[0, 1] * G[1, 2] - G[0, 2] * G[1, 1]
-    det = G[0, 0] * c00 + G[0, 1] * c01 + G[0, 2] * c02
-    if not det > 1e-9 * G[0, 0] * G[1, 1] * G[2, 2]:
+def _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out):  # pragma: no cover
+    """out = inverse(G) h for symmetric 3x3 G; false where G is singular."""
+    c00 = g11 * g22 - g12 * g12
+    c01 = g02 * g12 - g01 * g22
+    c02 = g01 * g12 - g02 * g11
+    det = g00 * c00 + g01 * c01 + g02 * c02
+    if not det > 1e-9 * g00 * g11 * g22:
         return False
-    c11 = G[0, 0] * G[2, 2] - G[0, 2] * G[0, 2]
-    c12 = G[0, 1] * G[0, 2] - G[0, 0] * G[1, 2]
-    c22 = G[0, 0] * G[1, 1] - G[0, 1] * G[0, 1]
-    out[0] = (c00 * h[0] + c01 * h[1] + c02 * h[2]) / det
-    out[1] = (c01 * h[0] + c11 * h[1] + c12 * h[2]) / det
-    out[2] = (c02 * h[0] + c12 * h[1] + c22 * h[2]) / det
+    c11 = g00 * g22 - g02 * g02
+    c12 = g01 * g02 - g00 * g12
+    c22 = g00 * g11 - g01 * g01
+    out[0] = (c00 * h0 + c01 * h1 + c02 * h2) / det
+    out[1] = (c01 * h0 + c11 * h1 + c12 * h2) / det
+    out[2] = (c02 * h0 + c12 * h1 + c22 * h2) / det
     return True
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, fastmath=SUMS)
 def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
     """Least squares on the D observations of v; false where they do not determine one."""
-    G = np.zeros((3, 3))
-    h = np.zeros(3)
-    count = 0
+    v0, v1, v2 = v[0], v[1], v[2]
+    g00 = g01 = g02 = g11 = g12 = g22 = h0 = h1 = h2 = count = 0.0
     for m in range(n):
-        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
-        if abs(excess) <= T * x[m]:
-            b0, b1, b2 = np.float64(a0[m]), np.float64(a1[m]), np.float64(a2[m])
-            G[0, 0] += b0 * b0
-            G[0, 1] += b0 * b1
-            G[0, 2] += b0 * b2
-            G[1, 1] += b1 * b1
-            G[1, 2] += b1 * b2
-            G[2, 2] += b2 * b2
-            h[0] += b0 * x[m]
-            h[1] += b1 * x[m]
-            h[2] += b2 * x[m]
-            count += 1
-    return count >= 3 and _solve(G, h, out)
+        excess = x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)
+        w = 1.0 if abs(excess) <= T * x[m] else 0.0
+        b0, b1, b2, y = w * a0[m], w * a1[m], w * a2[m], np.float64(x[m])
+        count += w
+        g00 += b0 * a0[m]
+        g01 += b0 * a1[m]
+        g02 += b0 * a2[m]
+        g11 += b1 * a1[m]
+        g12 += b1 * a2[m]
+        g22 += b2 * a2[m]
+        h0 += b0 * y
+        h1 += b1 * y
+        h2 += b2 * y
+    return count >= 3 and _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, fastmath=SUMS)
 def _polish(x, a0, a1, a2, n, reach, v):  # pragma: no cover
     """Weighted least squares on all lit observations, from v, into v.
 
@@ -100,30 +101,25 @@ def _polish(x, a0, a1, a2, n, reach, v):  # pragma: no cover
     observations that noise has moved, and keep the tails of highlights.
     """
     w = np.empty(3, np.float64)
-    G = np.empty((3, 3))
-    h = np.empty(3)
-    for _ in range(3):
-        G[:] = 0
-        h[:] = 0
-        weight = 0.0
+    for _ in range(2):
+        v0, v1, v2 = v[0], v[1], v[2]
+        g00 = g01 = g02 = g11 = g12 = g22 = h0 = h1 = h2 = weight = 0.0
         for m in range(n):
-            excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
-            u = 1 - (excess / reach) ** 2
-            if u <= 0:
-                continue
+            excess = (x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)) / reach
+            u = np.float64(max(np.float32(0), np.float32(1) - excess * excess))
             u *= u
+            b0, b1, b2, y = u * a0[m], u * a1[m], u * a2[m], np.float64(x[m])
             weight += u
-            b0, b1, b2 = u * a0[m], u * a1[m], u * a2[m]
-            G[0, 0] += b0 * a0[m]
-            G[0, 1] += b0 * a1[m]
-            G[0, 2] += b0 * a2[m]
-            G[1, 1] += b1 * a1[m]
-            G[1, 2] += b1 * a2[m]
-            G[2, 2] += b2 * a2[m]
-            h[0] += b0 * x[m]
-            h[1] += b1 * x[m]
-            h[2] += b2 * x[m]
-        if weight < MIN_WEIGHT or not _solve(G, h, w):
+            g00 += b0 * a0[m]
+            g01 += b0 * a1[m]
+            g02 += b0 * a2[m]
+            g11 += b1 * a1[m]
+            g12 += b1 * a2[m]
+            g22 += b2 * a2[m]
+            h0 += b0 * y
+            h1 += b1 * y
+            h2 += b2 * y
+        if weight < MIN_WEIGHT or not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, w):
             return
         v[0], v[1], v[2] = w[0], w[1], w[2]
 
