@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .analysis import Cancel, Options
 from .bases import choose_bases
+from .errors import OptionError
 from .factorize import (
     Factorization,
     fit_bases,
@@ -147,3 +148,47 @@ def shadow_bins(histogram: NDArray[np.float64]) -> int:
         return FLOOR
     above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
     return peak + int(above[0]) + 1 if above.size else CEILING
+
+
+@dataclass(frozen=True)
+class ShadowLevel:
+    """Ts between sampled shadows and sampled lit pixels."""
+
+    Ts: float
+    """Fraction of full scale."""
+    error: float
+    """Share of the samples on the wrong side, each kind counted alike; 0 to 1."""
+
+
+def sample_shadow_level(
+    shadows: NDArray[np.floating], lit: NDArray[np.floating] | None = None
+) -> ShadowLevel:
+    """Ts the paper's way: from pixels that someone points out as shadow, and as lit.
+
+    With both, the level that puts the smallest share on the wrong side, in the middle of the
+    levels that do so equally; with shadows alone, three of their standard deviations above their
+    mean, at least their maximum.
+
+    Args:
+        shadows: sampled intensities in shadow, fraction of full scale; at least one.
+        lit: sampled intensities in light.
+
+    Raises:
+        OptionError: no shadow is sampled.
+    """
+    dark = np.sort(np.asarray(shadows, np.float64).ravel())
+    if dark.size == 0:
+        raise OptionError("no shadow pixel is sampled; at least one is needed for Ts")
+    bright = np.sort(np.asarray([] if lit is None else lit, np.float64).ravel())
+    if bright.size == 0:
+        return ShadowLevel(float(max(dark.mean() + 3 * dark.std(), np.nextafter(dark[-1], 1))), 0.0)
+    # an observation is shadow when i < Ts: the candidates lie between neighbouring samples
+    values = np.unique(np.concatenate([dark, bright]))
+    levels = np.concatenate(
+        [[values[0]], (values[1:] + values[:-1]) / 2, [np.nextafter(values[-1], 2)]]
+    )
+    wrong_dark = 1 - np.searchsorted(dark, levels, side="left") / dark.size
+    wrong_lit = np.searchsorted(bright, levels, side="left") / bright.size
+    error = (wrong_dark + wrong_lit) / 2
+    best = np.flatnonzero(error == error.min())
+    return ShadowLevel(float(levels[best[len(best) // 2]]), float(error.min()))

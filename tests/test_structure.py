@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors", "factors", "stack", "analysis", "kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
-    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds"),
-    ("shape", "evaluate", "paper"),
+    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds", "saturation", "confidence"),
+    ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),
     ("console",),
