@@ -67,9 +67,9 @@ class Confidence:
     spread: NDArray[np.float32]
     """(H,W) 0 where the lights of its D observations lie in a plane, 1 where they spread evenly."""
     support: NDArray[np.float64]
-    """(K,) share of D among the lit pixels of an image that face the light."""
+    """(K,) share of an image's lit pixels that are possible, not darker than the fit allows."""
     residual: NDArray[np.float64]
-    """(K,) median of |i - l|/i there."""
+    """(K,) median of |i - l|/i among its lit pixels."""
     gain: NDArray[np.float64]
     """(K,) median of i/l there."""
     saturated: NDArray[np.float64]

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from .analysis import Confidence
 from .blocks import run_blocks
 from .factorize import Factorization, orthogonalize
-from .factors import Factor, Thresholds
+from .factors import Thresholds
 from .kernels import evidence_rows
 from .linearize import Quality
 from .stack import ImageStack
@@ -14,9 +14,9 @@ from .stack import ImageStack
 BLOCK = 1 << 14
 FEW = 4
 """Lit images below which three observations fit whatever they are."""
-MISFIT = 0.15
+MISFIT = 0.08
 """Share of lit pixels by which an image may fit worse than the median image."""
-GAIN = 0.05
+GAIN = 0.1
 """Change of exposure, against known light powers, that is worth a word."""
 SATURATED = 0.05
 FLATNESS = 4.0
@@ -63,7 +63,7 @@ def measure_confidence(
     step = max(1, P // 20_000)
     some = stack.pixels[::step]
     support, residual, gain = judge_images(
-        X[:, some], coefficients @ bases.reshape(3, -1)[:, some], flat[:, some], thresholds
+        X[:, some], coefficients @ bases.reshape(3, -1)[:, some], thresholds, quality.noise
     )
     return Confidence(
         lit=paint(lit),
@@ -80,28 +80,33 @@ def measure_confidence(
 def judge_images(
     i: NDArray[np.float32],
     l: NDArray[np.float64],
-    labels: NDArray[np.uint8],
     thresholds: Thresholds,
+    noise: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Support, residual and gain of each image, from some pixels.
 
     Args:
         i: (K,M) input.
-        l: (K,M) linearized.
-        labels: (K,M)
+        l: (K,M) linearized, NaN where unknown.
+        noise: standard deviation of an observation, fraction of full scale.
 
     Returns:
-        (K,) share of D among the lit pixels that face the light; (K,) median of |i - l|/i and (K,)
-        median of i/l there. 0, 0 and 1 for an image without such pixels.
+        (K,) share of the lit pixels that are possible: not below the fit, which nothing can cause,
+        by more than T i and three times the noise; (K,) median of |i - l|/i and (K,) median of i/l
+        where both are lit. 1, 0 and 1 for an image without such pixels.
     """
-    support, residual, gain = np.zeros(len(i)), np.zeros(len(i)), np.ones(len(i))
+    support, residual, gain = np.ones(len(i)), np.zeros(len(i)), np.ones(len(i))
     for k in range(len(i)):
-        faced = (i[k] >= max(thresholds.Ts, 1e-9)) & (l[k] > 0)
-        if faced.any():
-            a, b = i[k, faced], l[k, faced]
-            support[k] = (labels[k, faced] == Factor.DIFFUSE).mean()
-            residual[k] = np.median(np.abs(a - b) / a)
-            gain[k] = np.median(a / b)
+        lit = (i[k] >= max(thresholds.Ts, 1e-9)) & np.isfinite(l[k])
+        if not lit.any():
+            continue
+        a, b = i[k, lit], l[k, lit]
+        slack = thresholds.T * a + 3 * noise
+        support[k] = ((b - a <= slack) & (b >= -slack)).mean()
+        facing = b >= max(thresholds.Ts, 1e-9)
+        if facing.any():
+            residual[k] = np.median(np.abs(a - b)[facing] / a[facing])
+            gain[k] = np.median(a[facing] / b[facing])
     return support, residual, gain
 
 
@@ -136,9 +141,9 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
     slack = max(MISFIT, 5 * float(np.median(np.abs(support - usual))))
     for k in np.flatnonzero(support < usual - slack):
         doubts.append(
-            f"image {k} ({stack.names[k]}) does not fit the others: {100 * support[k]:.0f} % of "
-            f"its lit pixels agree, {100 * usual:.0f} % of the median image's; moved camera, wrong "
-            "light or wrong order are possible"
+            f"image {k} ({stack.names[k]}) does not fit the others: {100 * (1 - support[k]):.0f} % "
+            f"of its lit pixels are darker than possible, {100 * (1 - usual):.0f} % of the median "
+            "image's; a moved camera, a wrong light or a wrong order are possible"
         )
     if stack.lights is not None:
         slack = max(GAIN, 5 * float(np.median(np.abs(gain - np.median(gain)))))

@@ -74,7 +74,7 @@ def suggest_thresholds(
     if T is None:
         assert found is not None
         T = round(follow_noise(found.noise), 4)
-    offset = bin_width * offset_bins(histogram)
+    offset = bin_width * offset_bins(histogram, int((sample.images <= 0).sum()))
     return Suggestion(Thresholds(T, Ts), histogram, bin_width, offset, tuple(starts), found)
 
 
@@ -124,11 +124,14 @@ def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], fl
     return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64), bin_width
 
 
-def offset_bins(histogram: NDArray[np.float64]) -> float:
+def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:
     """Bins of `dark_histogram` below the shadows' own level: light that all images share.
 
-    Shadows around a level that is not zero leave the bins below it empty on both sides of the
-    mode; noise clipped at zero does not.
+    Shadows around a level that is not zero leave the bins below it empty, and no observation is
+    exactly black; noise clipped at zero makes nearly half of them so.
+
+    Args:
+        blacks: observations that are exactly 0.
     """
     smooth = np.convolve(np.pad(histogram, 2), SMOOTHING, mode="valid")
     grays = np.median(smooth[GRAYS])
@@ -136,7 +139,7 @@ def offset_bins(histogram: NDArray[np.float64]) -> float:
     below = smooth[: max(peak - 1, 0)]
     if smooth[peak] <= 2 * grays or not below.size or below.min() > 0.5 * smooth[peak]:
         return 0.0
-    return peak + 0.5
+    return 0.0 if blacks > 0.2 * histogram[: 2 * peak + 1].sum() else peak + 0.5
 
 
 def shadow_bins(histogram: NDArray[np.float64]) -> int:
