@@ -9,6 +9,7 @@ from .factorize import Factorization, orthogonalize
 from .factors import Thresholds
 from .kernels import evidence_rows
 from .linearize import Quality
+from .near_light import Regions
 from .stack import ImageStack
 
 BLOCK = 1 << 14
@@ -19,6 +20,10 @@ MISFIT = 0.08
 GAIN = 0.1
 """Change of exposure, against known light powers, that is worth a word."""
 SATURATED = 0.05
+NEAR = 1.2
+"""Degrees by which the lights of a quarter of the picture may differ from those of all of it..."""
+NEAR_RATIO = 6.0
+"""... unless that is less than this many times what noise does."""
 FLATNESS = 4.0
 """Third dimension of the stack, in units of the noise, below which it is hardly there."""
 
@@ -159,6 +164,19 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
             "exposure"
         )
     return doubts
+
+
+def doubt_distance(regions: Regions | None) -> list[str]:
+    """Whether the lights are too near for one direction each."""
+    if regions is None or regions.quarters < NEAR:
+        return []
+    if regions.quarters < NEAR_RATIO * regions.control:
+        return []
+    return [
+        f"the lights differ between the quarters of the picture by {regions.quarters:.1f} degrees "
+        f"({regions.control:.1f} from noise): they may be near the object; move them away, or "
+        "analyze a smaller region"
+    ]
 
 
 def doubt_dimensions(found: Factorization) -> list[str]:

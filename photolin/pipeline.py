@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
-from .confidence import find_doubts, measure_confidence
+from .confidence import doubt_distance, find_doubts, measure_confidence
 from .errors import DegenerateError, OptionError
+from .factorize import Factorization
+from .factors import Thresholds
 from .label import label_images
 from .linearize import Quality, linearize
-from .sample import draw_sample
+from .near_light import Regions, compare_regions
+from .sample import Sample, choose_pixels, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
@@ -91,6 +94,7 @@ def analyze(
         doubts = [
             *doubt_blackness(suggestion),
             *find_doubts(stack, confidence, found, thresholds),
+            *doubt_distance(find_regions(stack, sample, found, options, thresholds)),
         ]
 
     return Analysis(
@@ -148,6 +152,20 @@ def relate_to_bases(
     related = coefficients @ np.linalg.inv(rows)
     related[list(base_images)] = np.eye(3)
     return related
+
+
+def find_regions(
+    stack: ImageStack,
+    sample: Sample,
+    found: Factorization | None,
+    options: Options,
+    thresholds: Thresholds,
+) -> Regions | None:
+    """How the sample's coefficients differ between parts of the picture, where they are known."""
+    if found is None:
+        return None
+    rows, columns = np.divmod(choose_pixels(stack, options.seed), stack.shape[2])
+    return compare_regions(sample, rows, columns, found, thresholds)
 
 
 def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:

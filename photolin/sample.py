@@ -27,6 +27,15 @@ class Sample:
         )
 
 
+def choose_pixels(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> NDArray[np.intp]:
+    """Flat indices of at most `count` mask pixels, drawn without replacement, ascending."""
+    pixels = stack.pixels
+    if len(pixels) > count:
+        rng = np.random.default_rng(seed)
+        pixels = np.sort(rng.choice(pixels, count, replace=False))
+    return pixels
+
+
 def draw_sample(
     stack: ImageStack,
     seed: int,
@@ -39,10 +48,7 @@ def draw_sample(
         white: (K,) values from which observations are saturated: those are set to 0, so that they
             have no say; none when left out.
     """
-    pixels = stack.pixels
-    if len(pixels) > count:
-        rng = np.random.default_rng(seed)
-        pixels = np.sort(rng.choice(pixels, count, replace=False))
+    pixels = choose_pixels(stack, seed, count)
     images = stack.images.reshape(len(stack.images), -1)[:, pixels]
     if white is not None:
         images = np.where(images < white[:, None], images, np.float32(0))

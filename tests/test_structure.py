@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors", "factors", "stack", "analysis", "kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
-    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds", "saturation", "confidence"),
+    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds", "saturation", "near_light", "confidence"),
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),

@@ -187,14 +187,13 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
             continue
         for step in range(3):
             s, d = _score(x, a0, a1, a2, n, v, T)
+            # whichever wins, the other one is a rival
+            if min(s, score) > second and _differ(v, best):
+                second = min(s, score)
             if s < score:
-                if s > second and _differ(v, best):
-                    second = s
                 break
             e = _misfit(x, a0, a1, a2, n, v, T)
             if s > score or e < misfit:
-                if score > second and _differ(v, best):
-                    second = score
                 score, diffuse, misfit = s, d, e
                 best[:] = v
             elif step > 0:
