@@ -94,13 +94,12 @@ def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True, fastmath=SUMS)
-def _polish(x, a0, a1, a2, n, reach, v):  # pragma: no cover
+def _polish(x, a0, a1, a2, n, reach, w, v):  # pragma: no cover
     """Weighted least squares on all lit observations, from v, into v.
 
-    Weights are Tukey's biweight of the residual, zero from `reach` on: T i would drop dim
-    observations that noise has moved, and keep the tails of highlights.
+    `w` is scratch, (3,) float64. Weights are Tukey's biweight of the residual, zero from `reach`
+    on: T i would drop dim observations that noise has moved, and keep the tails of highlights.
     """
-    w = np.empty(3, np.float64)
     for _ in range(2):
         v0, v1, v2 = v[0], v[1], v[2]
         g00 = g01 = g02 = g11 = g12 = g22 = h0 = h1 = h2 = weight = 0.0
@@ -167,18 +166,24 @@ def _differ(v, w):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
+def _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, best):  # pragma: no cover
     """Best v of n lit observations into `best`; returns its score, or UNFIT, and the runner-up's.
 
-    `best` holds a first guess, or NaN; `tries` as in `consensus_rows`. The runner-up is the best
+    `best` holds a first guess, or NaN; v (float32) and w (float64) are scratch, (3,); `tries` as
+    in `consensus_rows`. The runner-up is the best
     scored solution that differs from the winner.
     """
     score, diffuse, misfit, second = UNFIT, 0, 0.0, UNFIT
-    v = np.empty(3, np.float32)
-    w = np.empty(3, np.float64)
+    if not np.isfinite(best[0]):
+        # most pixels show no highlight: then all that is lit is D, and nothing need be drawn
+        v[:] = 0
+        if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
+            best[0], best[1], best[2] = w[0], w[1], w[2]
     if np.isfinite(best[0]):
         score, diffuse = _score(x, a0, a1, a2, n, best, T)
         misfit = _misfit(x, a0, a1, a2, n, best, T)
+        if diffuse == n and n > 3:
+            return score, second
     drawn = 0
     while drawn < min(limit, tries[diffuse * (len(tries) - 1) // n]):
         drawn += 1
@@ -201,12 +206,6 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
             if not _refit(x, a0, a1, a2, n, v, T, w):
                 break
             v[0], v[1], v[2] = w[0], w[1], w[2]
-    if score == UNFIT:
-        # all samples lie near a plane: the best that can be said is what fits them all
-        v[:] = 0
-        if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
-            best[0], best[1], best[2] = w[0], w[1], w[2]
-            score, _ = _score(x, a0, a1, a2, n, best, T)
     return score, second
 
 
@@ -236,6 +235,8 @@ def consensus_rows(
     a0 = np.empty(M, np.float32)
     a1 = np.empty(M, np.float32)
     a2 = np.empty(M, np.float32)
+    v = np.empty(3, np.float32)
+    w = np.empty(3, np.float64)
     for r in range(start, stop):
         column = columns[r]
         n = 0
@@ -250,9 +251,9 @@ def consensus_rows(
             margin[r] = 0
             continue
         state = np.uint64(seed) ^ (np.uint64(column) * np.uint64(0xD1342543DE82EF95))
-        score[r], second = _fit(x, a0, a1, a2, n, T, tries, limit, state, out[r])
+        score[r], second = _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, out[r])
         margin[r] = max(0, score[r] - max(second, -n))
         if score[r] == UNFIT:
             out[r] = np.nan
         elif reach > 0:
-            _polish(x, a0, a1, a2, n, reach, out[r])
+            _polish(x, a0, a1, a2, n, reach, w, out[r])
