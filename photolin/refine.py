@@ -65,7 +65,8 @@ def refine_coefficients(
         DegenerateError: the observations do not determine coefficients.
         Cancelled: `cancel` said so.
     """
-    c, noise = orthogonalize(coefficients), Noise(FIRST_T / CUT, 0.0, FIRST_T)
+    before = c = orthogonalize(coefficients)
+    noise = Noise(FIRST_T / CUT, 0.0, FIRST_T)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
     few = sample.thin(ROUGH_PIXELS)
     for round_ in range(ROUNDS):
@@ -88,6 +89,8 @@ def refine_coefficients(
         still = some is sample and change_of_span(before, c) < STILL
         if still and width <= max(2 * noise.relative, LAST_WIDTH):
             break
+    # the last step has turned the frame that the bases are in, the more the less is determined
+    bases = (np.linalg.lstsq(c, before)[0] @ bases).astype(np.float32)
     return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
 
