@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from .analysis import Confidence
 from .blocks import run_blocks
-from .factorize import Factorization, orthogonalize
+from .dimensions import Plane
+from .factorize import orthogonalize
 from .factors import Thresholds
 from .kernels import evidence_rows
 from .linearize import Quality
@@ -24,8 +25,10 @@ NEAR = 1.2
 """Degrees by which the lights of a quarter of the picture may differ from those of all of it..."""
 NEAR_RATIO = 6.0
 """... unless that is less than this many times what noise does."""
-FLATNESS = 4.0
-"""Third dimension of the stack, in units of the noise, below which it is hardly there."""
+FLAT = 0.85
+"""Share of the D observations from which two dimensions explain too many of them..."""
+FLAT_RESIDUAL = 2.0
+"""... unless what they leave is this many times the noise."""
 
 
 def measure_confidence(
@@ -115,9 +118,7 @@ def judge_images(
     return support, residual, gain
 
 
-def find_doubts(
-    stack: ImageStack, confidence: Confidence, found: Factorization | None, thresholds: Thresholds
-) -> list[str]:
+def find_doubts(stack: ImageStack, confidence: Confidence, thresholds: Thresholds) -> list[str]:
     """Sentences on what is wrong or cannot be told, each with the number that says so."""
     mask = stack.mask
     few, unlit = confidence.lit[mask] < FEW, confidence.lit[mask] < 3
@@ -125,17 +126,14 @@ def find_doubts(
     if unlit.any():
         doubts.append(
             f"{unlit.sum()} of {unlit.size} pixels are lit in fewer than three images (i >= Ts = "
-            f"{thresholds.Ts:g}) and stay undetermined"
+            f"{thresholds.Ts:g}), too few to determine them"
         )
     if few.mean() > 0.2:
         doubts.append(
             f"{100 * few.mean():.0f} % of the pixels are lit in fewer than {FEW} images, so that "
             "nothing checks their linearized values; more images would"
         )
-    doubts += doubt_images(stack, confidence)
-    if found is not None:
-        doubts += doubt_dimensions(found)
-    return doubts
+    return doubts + doubt_images(stack, confidence)
 
 
 def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
@@ -143,7 +141,8 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
     doubts = []
     support, gain = confidence.support, confidence.gain
     usual = np.median(support)
-    slack = max(MISFIT, 5 * float(np.median(np.abs(support - usual))))
+    # the last: shares of few pixels say little
+    slack = max(MISFIT, 5 * np.median(np.abs(support - usual)), 2 / np.sqrt(len(stack.pixels)))
     for k in np.flatnonzero(support < usual - slack):
         doubts.append(
             f"image {k} ({stack.names[k]}) does not fit the others: {100 * (1 - support[k]):.0f} % "
@@ -179,13 +178,12 @@ def doubt_distance(regions: Regions | None) -> list[str]:
     ]
 
 
-def doubt_dimensions(found: Factorization) -> list[str]:
-    """Whether the linearized sample really has three dimensions."""
-    b = found.bases[:, np.isfinite(found.bases[0])].astype(np.float64)
-    third = float(np.linalg.svd(b, compute_uv=False)[2] / np.sqrt(b.shape[1]))
-    if third >= FLATNESS * found.noise.absolute:
+def doubt_dimensions(plane: Plane | None) -> list[str]:
+    """Whether the stack really has three dimensions."""
+    if plane is None or plane.explained < FLAT or plane.residual > FLAT_RESIDUAL:
         return []
     return [
-        f"the stack hardly has three dimensions: the third is {third:.4f} of full scale, the noise "
-        f"{found.noise.absolute:.4f}; the lights may lie near a plane, or the scene may be flat"
+        f"the stack hardly has three dimensions: two explain {100 * plane.explained:.0f} % of its "
+        f"diffuse observations, and leave {plane.residual:.1f} times the noise; the lights may lie "
+        "in one plane or the scene may be flat: vary the lights, or give them"
     ]

@@ -47,7 +47,8 @@ def compare_regions(
         sample, found.coefficients, found.bases, everywhere, tolerance, thresholds.Ts, width
     )
     place = (rows > np.median(rows)) * 2 + (columns > np.median(columns))
-    if np.bincount(place, minlength=4).min() < LEAST_PIXELS:
+    telling = place[weights.any(axis=1)]
+    if np.bincount(telling, minlength=4).min() < LEAST_PIXELS:
         return None
 
     def angle(chosen: NDArray) -> float:

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
-from .confidence import doubt_distance, find_doubts, measure_confidence
+from .confidence import doubt_dimensions, doubt_distance, find_doubts, measure_confidence
+from .dimensions import fit_plane
 from .errors import DegenerateError, OptionError
 from .factorize import Factorization
 from .factors import Thresholds
 from .label import label_images
 from .linearize import Quality, linearize
-from .near_light import Regions, compare_regions
+from .near_light import compare_regions
 from .sample import Sample, choose_pixels, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
@@ -93,8 +94,8 @@ def analyze(
         )
         doubts = [
             *doubt_blackness(suggestion),
-            *find_doubts(stack, confidence, found, thresholds),
-            *doubt_distance(find_regions(stack, sample, found, options, thresholds)),
+            *find_doubts(stack, confidence, thresholds),
+            *doubt_lights(stack, sample, found, options, thresholds),
         ]
 
     return Analysis(
@@ -154,18 +155,21 @@ def relate_to_bases(
     return related
 
 
-def find_regions(
+def doubt_lights(
     stack: ImageStack,
     sample: Sample,
     found: Factorization | None,
     options: Options,
     thresholds: Thresholds,
-) -> Regions | None:
-    """How the sample's coefficients differ between parts of the picture, where they are known."""
+) -> list[str]:
+    """Whether lights found in the sample lie in a plane, or any are near."""
     if found is None:
-        return None
+        return []
+    plane = fit_plane(sample, found, thresholds) if stack.lights is None else None
     rows, columns = np.divmod(choose_pixels(stack, options.seed), stack.shape[2])
-    return compare_regions(sample, rows, columns, found, thresholds)
+    regions = compare_regions(sample, rows, columns, found, thresholds)
+    # where one dimension is noise, it differs between parts of the picture too
+    return doubt_dimensions(plane) or doubt_distance(regions)
 
 
 def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:

@@ -1,6 +1,7 @@
 """T and Ts from the data: the shadow level, and the noise that D observations show."""
 
 from dataclasses import dataclass
+from math import floor, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ def suggest_thresholds(
         DegenerateError: the images do not determine coefficients.
     """
     histogram, bin_width = dark_histogram(sample.images)
-    Ts = options.Ts if options.Ts is not None else round(bin_width * shadow_bins(histogram), 4)
+    Ts = options.Ts if options.Ts is not None else shorten(bin_width * shadow_bins(histogram))
     starts = find_starts(sample, Ts, options, lights)
     T, found = options.T, None
     if T is None or options.method == "robust":
@@ -122,6 +123,11 @@ def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], fl
     # exact zeros are left out: noise clipped at zero piles up there and hides the mode's width
     rows = [np.histogram(image[image > 0], bins)[0] for image in images]
     return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64), bin_width
+
+
+def shorten(level: float) -> float:
+    """Rounded to four decimals, or to two digits where that is finer, as on very dark stacks."""
+    return round(level, max(4, 1 - floor(log10(level)))) if level > 0 else 0.0
 
 
 def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:

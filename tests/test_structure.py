@@ -17,7 +17,8 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors", "factors", "stack", "analysis", "kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
-    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds", "saturation", "near_light", "confidence"),
+    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds"),
+    ("saturation", "near_light", "dimensions", "confidence"),
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),

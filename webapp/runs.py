@@ -11,6 +11,7 @@ from photolin.factors import Thresholds
 from photolin.kernels import consensus_rows
 from photolin.pipeline import analyze
 from photolin.sample import draw_sample
+from photolin.saturation import find_white
 from photolin.stack import ImageStack
 from photolin.thresholds import suggest_thresholds
 
@@ -57,7 +58,7 @@ class Runs:
             Cancelled: `cancel` returned true.
         """
         free = replace(self.options, T=None, Ts=None)
-        sample = draw_sample(self.stack, free.seed)
+        sample = draw_sample(self.stack, free.seed, find_white(self.stack))
         return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
 
     @contextmanager
