@@ -107,7 +107,8 @@ def check_lights(lights: NDArray, count: int, title: str) -> None:
     size = np.abs(lights).max(axis=1)
     if not ((size > 1e-9) & (size < 1e9)).all():
         raise InputError(
-            f"{title}: a light is zero or not finite; x y z of a length from 1e-9 to 1e9 is accepted"
+            f"{title}: a light is zero or not finite; "
+            "x y z of a length from 1e-9 to 1e9 is accepted"
         )
     norms = np.linalg.norm(lights, axis=1, keepdims=True)
     if np.linalg.svd(lights / norms, compute_uv=False)[2] < 1e-3 * np.sqrt(count):
