@@ -10,7 +10,7 @@ from .factorize import orthogonalize
 from .factors import Thresholds
 from .kernels import evidence_rows
 from .linearize import Quality
-from .near_light import Regions
+from .near_light import WORTH, Regions
 from .stack import ImageStack
 
 BLOCK = 1 << 14
@@ -21,10 +21,8 @@ MISFIT = 0.08
 GAIN = 0.1
 """Change of exposure, against known light powers, that is worth a word."""
 SATURATED = 0.05
-NEAR = 1.2
-"""Degrees by which the lights of a quarter of the picture may differ from those of all of it..."""
 NEAR_RATIO = 6.0
-"""... unless that is less than this many times what noise does."""
+"""Times that the lights of a quarter of the picture differ more than noise makes them."""
 FLAT = 0.85
 """Share of the D observations from which two dimensions explain too many of them..."""
 FLAT_RESIDUAL = 2.0
@@ -167,7 +165,7 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
 
 def doubt_distance(regions: Regions | None) -> list[str]:
     """Whether the lights are too near for one direction each."""
-    if regions is None or regions.quarters < NEAR:
+    if regions is None or regions.quarters < WORTH:
         return []
     if regions.quarters < NEAR_RATIO * regions.control:
         return []

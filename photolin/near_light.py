@@ -13,6 +13,8 @@ from .sample import Sample
 T = 0.03
 """Least tolerance of D here: near lights must not drop out before they are seen."""
 STEPS = 2
+WORTH = 1.2
+"""Degrees by which the lights of a quarter differ from those of all when it is worth a word."""
 LEAST_PIXELS = 100
 
 
@@ -23,7 +25,8 @@ class Regions:
     quarters: float
     """Median angle, degrees, between the coefficients of a quarter of the picture and of all."""
     control: float
-    """The same for quarters of the pixels that are spread over the picture: what noise does."""
+    """The same for quarters of the pixels that are spread over the picture: what noise does. 0,
+    not measured, where `quarters` is below WORTH."""
 
 
 def compare_regions(
@@ -57,8 +60,8 @@ def compare_regions(
             c = orthogonalize(gauss_newton_step(sample.pixels[chosen], weights[chosen], c))
         return float(np.degrees(change_of_span(found.coefficients, c)))
 
+    quarters = float(np.median([angle(place == quarter) for quarter in range(4)]))
+    if quarters < WORTH:
+        return Regions(quarters, 0.0)
     spread = np.arange(len(rows)) % 4
-    return Regions(
-        float(np.median([angle(place == quarter) for quarter in range(4)])),
-        float(np.median([angle(spread == quarter) for quarter in range(4)])),
-    )
+    return Regions(quarters, float(np.median([angle(spread == part) for part in range(4)])))

@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
@@ -21,6 +23,14 @@ from .sample import Sample, choose_pixels, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
+
+
+class Talk(NamedTuple):
+    """How a run is worked on and watched; nothing of it changes the result."""
+
+    threads: int | None
+    progress: Progress | None
+    cancel: Cancel | None
 
 
 def analyze(
@@ -49,55 +59,40 @@ def analyze(
     check_base_images(options, stack)
     if threads is not None and threads < 1:
         raise OptionError(f"threads is {threads}; accepted is 1 or more")
-    seconds: dict[str, float] = {}
+    # a sum's last digits depend on how many threads of BLAS share it; our own do not
+    with threadpool_limits(1, "blas"):
+        return run_stages(stack, options, Talk(threads, progress, cancel))
 
-    with timed("thresholds", seconds, progress):
+
+def run_stages(stack: ImageStack, options: Options, talk: Talk) -> Analysis:
+    """All stages in order, each from the results of those before."""
+    seconds: dict[str, float] = {}
+    with timed("thresholds", seconds, talk.progress):
         white = find_white(stack)
         sample = draw_sample(stack, options.seed, white)
-        suggestion = suggest_thresholds(sample, options, stack.lights, cancel)
+        suggestion = suggest_thresholds(sample, options, stack.lights, talk.cancel)
     thresholds, base_images = suggestion.thresholds, suggestion.starts[0]
     found = suggestion.found
     quality = Quality(white, 0.0 if found is None else found.noise.absolute)
-
-    with timed("coefficients", seconds, progress):
-        if stack.lights is not None:
-            coefficients = stack.lights
-        elif options.method == "robust" and found is not None:
-            coefficients = found.coefficients
-        else:
-            coefficients = estimate_coefficients(
-                stack, base_images, thresholds, options, threads, progress, cancel
-            )
-        coefficients = relate_to_bases(coefficients, base_images)
-
-    with timed("linearize", seconds, progress):
+    with timed("coefficients", seconds, talk.progress):
+        coefficients = find_coefficients(stack, suggestion, options, talk)
+    with timed("linearize", seconds, talk.progress):
         bases, margin = linearize(
-            stack,
-            coefficients,
-            base_images,
-            thresholds,
-            options,
-            quality,
-            threads,
-            progress,
-            cancel,
+            stack, coefficients, base_images, thresholds, options, quality, *talk
         )
-
-    with timed("classify", seconds, progress):
+    with timed("classify", seconds, talk.progress):
         labels = label_images(
-            stack.images, bases, coefficients, stack.mask, thresholds, threads=threads
+            stack.images, bases, coefficients, stack.mask, thresholds, threads=talk.threads
         )
-
-    with timed("confidence", seconds, progress):
+    with timed("confidence", seconds, talk.progress):
         confidence = measure_confidence(
-            stack, coefficients, bases, labels, margin, thresholds, quality, threads
+            stack, coefficients, bases, labels, margin, thresholds, quality, talk.threads
         )
-        doubts = [
+        doubts = (
             *doubt_blackness(suggestion),
             *find_doubts(stack, confidence, thresholds),
             *doubt_lights(stack, sample, found, options, thresholds),
-        ]
-
+        )
     return Analysis(
         options=options,
         thresholds=thresholds,
@@ -115,6 +110,22 @@ def analyze(
         confidence=confidence,
         warnings=(*stack.warnings, *doubts),
     )
+
+
+def find_coefficients(
+    stack: ImageStack, suggestion: Suggestion, options: Options, talk: Talk
+) -> NDArray[np.float64]:
+    """Step 1, (K,3): from known lights, as found on the sample, or as published."""
+    base_images = suggestion.starts[0]
+    if stack.lights is not None:
+        coefficients = stack.lights
+    elif options.method == "robust" and suggestion.found is not None:
+        coefficients = suggestion.found.coefficients
+    else:
+        coefficients = estimate_coefficients(
+            stack, base_images, suggestion.thresholds, options, *talk
+        )
+    return relate_to_bases(coefficients, base_images)
 
 
 @contextmanager

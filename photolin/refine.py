@@ -123,8 +123,10 @@ def measure_noise(
         return NO_NOISE
     tail = float(np.quantile(short / i, WITHIN))
     short, i = short[counted], i[counted]
-    # T i cuts off the noise of dim observations, but not that of bright ones
-    bright = i >= np.median(i)
+    # T i cuts off the noise of dim observations, but not that of bright ones; bright by the fit:
+    # among equally lit pixels the brighter observations are those with less noise below it
+    level = i + short
+    bright = level >= np.median(level)
     return Noise(half_normal(short / i), half_normal(short[bright]), tail)
 
 
