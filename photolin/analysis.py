@@ -55,6 +55,32 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
+class Confidence:
+    """What a result rests on; read-only."""
+
+    lit: NDArray[np.uint16]
+    """(H,W) images in which a pixel is lit (i >= Ts) and not saturated; 0 outside the mask."""
+    diffuse: NDArray[np.uint16]
+    """(H,W) images in which it is D."""
+    margin: NDArray[np.uint16]
+    """(H,W) votes by which the winner beat the best different solution; 0 by published methods."""
+    spread: NDArray[np.float32]
+    """(H,W) 0 where the lights of its D observations lie in a plane, 1 where they spread evenly."""
+    support: NDArray[np.float64]
+    """(K,) share of an image's lit pixels that are possible, not darker than the fit allows."""
+    residual: NDArray[np.float64]
+    """(K,) median of |i - l|/i among its lit pixels."""
+    gain: NDArray[np.float64]
+    """(K,) median of i/l there."""
+    saturated: NDArray[np.float64]
+    """(K,) share of saturated pixels."""
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.setflags(write=False)
+
+
+@dataclass(frozen=True, eq=False)
 class Analysis:
     """The linearization and labels of one stack; read-only."""
 
@@ -78,6 +104,8 @@ class Analysis:
     seconds: Mapping[str, float]
     """Wall-clock seconds of each stage, and their `total` (without load and save)."""
     title: str = "stack"
+    confidence: Confidence | None = None
+    """None in results of versions that did not measure it."""
     lights: NDArray[np.float64] | None = None
     """(K,3) as the stack gave them; x right, y up, z to the camera."""
     files: tuple[tuple[str, str], ...] = ()

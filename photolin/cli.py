@@ -200,7 +200,7 @@ def evaluate(
             raise InputError(f"{path}: is a result; name its ground truth (gt.npz) after it")
         result = load_result(path)
         title = f"{result.title}, {result.options.method}, {thresholds(result)}"
-        print(format_evaluation(_measure(result, load_truth(truth)), title))
+        print(format_evaluation(_measure(result, load_truth(truth), _stack_of(path)), title))
         return
     answer = load_truth(path if truth is None else truth)
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
@@ -211,7 +211,7 @@ def evaluate(
         ]
     for result in results:
         print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
-    print(compare_with_paper({r.options.method: _measure(r, answer) for r in results}))
+    print(compare_with_paper({r.options.method: _measure(r, answer, images) for r in results}))
 
 
 @verb
@@ -266,5 +266,14 @@ def _load(path: Path, reading: LoadOptions, progress: Progress | None) -> tuple[
     return images, time.perf_counter() - start
 
 
-def _measure(result: Analysis, truth: Truth) -> Evaluation:
-    return measure(result.labels, result.coefficients, result.linearized_bases, truth)
+def _measure(result: Analysis, truth: Truth, stack: ImageStack | None) -> Evaluation:
+    images = None if stack is None else stack.images
+    return measure(result.labels, result.coefficients, result.linearized_bases, truth, images)
+
+
+def _stack_of(result: Path) -> ImageStack | None:
+    """The stack of a result, None where it is not there any more."""
+    try:
+        return load_result_stack(result)
+    except InputError:
+        return None

@@ -9,7 +9,7 @@ from .blocks import run_blocks
 from .kernels import consensus_rows
 
 BLOCK = 10_000
-CONFIDENCE = 0.999
+CONFIDENCE = 0.99
 """Wanted probability that at least one sample held D observations only."""
 
 
@@ -63,14 +63,29 @@ def fit_rows(
     out = np.full((len(columns), 3), np.nan, np.float32)
     if guess is not None:
         out[:] = guess
-    score = np.empty(len(columns), np.int32)
+    score, margin = np.empty(len(columns), np.int32), np.empty(len(columns), np.int32)
+    white = np.full(len(X), np.inf, np.float32)
     factors = np.ascontiguousarray(A, np.float32)
     tries, key = stopping_table(limit), np.uint64(seed)
     tolerance, level = np.float32(T), np.float32(Ts)
 
     def work(start: int, stop: int) -> None:
         consensus_rows(
-            X, columns, factors, tolerance, level, tries, limit, key, out, score, start, stop
+            X,
+            columns,
+            factors,
+            white,
+            tolerance,
+            level,
+            np.float32(0),
+            tries,
+            limit,
+            key,
+            out,
+            score,
+            margin,
+            start,
+            stop,
         )
 
     # about as much work in a block whether rows are pixels (short) or images (long)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 from .factors import LETTERS, Factor
+from .oracle import fit_oracle
 from .synthetic import Truth
 
 ROWS = (Factor.CAST, Factor.ATTACHED, Factor.DIFFUSE, Factor.SPECULAR)
@@ -39,6 +40,10 @@ class Evaluation:
     """Mask pixels lit in at least three images whose bases the result leaves open (NaN)."""
     light_error: float
     """Mean angle between true and estimated lights after the best 3x3 map, degrees."""
+    oracle_ratio: float = float("nan")
+    """rms divided by that of least squares with the true labels and lights, over the pixels where
+    both are known; NaN where the images were not given. Below 1 is possible: the oracle's D
+    observations hold tails of highlights."""
 
 
 def evaluate(
@@ -46,6 +51,7 @@ def evaluate(
     coefficients: NDArray[np.float64],
     linearized_bases: NDArray[np.float32],
     truth: Truth,
+    images: NDArray[np.float32] | None = None,
 ) -> Evaluation:
     """Compare a result with the truth of its stack.
 
@@ -53,6 +59,7 @@ def evaluate(
         labels: (K,H,W) Factor codes.
         coefficients: (K,3)
         linearized_bases: (3,H,W) signed, fraction of full scale.
+        images: (K,H,W) the stack, for the oracle ratio.
         truth: of the same K images of H x W pixels.
 
     Raises:
@@ -78,6 +85,14 @@ def evaluate(
         each = np.square(error).mean(1)
         rms, worst = float(np.sqrt(each.mean())), int(each.argmax())
         p99 = float(np.quantile(np.abs(error), 0.99))
+    ratio = float("nan")
+    if images is not None and known.any():
+        linearized, determined = fit_oracle(images, truth)
+        both = known & determined
+        ideal = truth.ideal[:, mask][:, both]
+        own = np.square(coefficients @ bases[:, both] - ideal).mean()
+        best = np.square(linearized[:, both] - ideal).mean()
+        ratio = float(np.sqrt(own / max(best, 1e-18)))
     return Evaluation(
         counts=counts,
         images=K,
@@ -88,6 +103,7 @@ def evaluate(
         worst_image=worst,
         undetermined=int((lit & ~known).sum()),
         light_error=light_error(coefficients, truth.lights),
+        oracle_ratio=ratio,
     )
 
 
@@ -135,5 +151,6 @@ def format_evaluation(evaluation: Evaluation, title: str = "result") -> str:
             f"linearized - ideal  rms {e.rms:.6f}, 99 % below {e.p99:.6f} of full scale, "
             f"worst in image {e.worst_image}; {e.undetermined} pixels undetermined",
             f"light error         {e.light_error:.3f} degrees",
+            *([] if np.isnan(e.oracle_ratio) else [f"oracle ratio        {e.oracle_ratio:.3f}"]),
         ]
     )

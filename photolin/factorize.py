@@ -35,6 +35,21 @@ NO_START = (
 )
 
 
+@dataclass(frozen=True)
+class Noise:
+    """Spread of D observations below the fit, where no highlight can be."""
+
+    relative: float
+    """Standard deviation of (i - l)/i."""
+    absolute: float
+    """Standard deviation of i - l in the brighter half, fraction of full scale."""
+    tail: float
+    """(l - i)/i that few exceed, see `refine.WITHIN`; noise need not be normal."""
+
+
+NO_NOISE = Noise(0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Factorization:
     """Coefficients and linearized bases of a sample that explain each other."""
@@ -45,8 +60,8 @@ class Factorization:
     """(3,M) of the sampled pixels; NaN where lit in fewer than three images."""
     score: int
     """D - U over all sampled pixels and images."""
-    noise: float = 0.0
-    """Standard deviation of (i - l)/i below the fit, where it was measured."""
+    noise: Noise = NO_NOISE
+    """What is left below the fit, where it was measured."""
 
 
 def search_coefficients(

@@ -1,6 +1,7 @@
 """Step 2: linearized bases of every pixel, (l1, l2, l3) by Eq. (6)."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,22 @@ from .stack import ImageStack
 
 BLOCK = 4096
 
-Work = Callable[[int, int, NDArray[np.float32]], None]
+REACH = 4.0
+"""Residual, in units of the noise, from which an observation has no weight in the last fit."""
+LEAST_REACH = 0.003
+"""The least such residual, as a share of the brightest grays."""
+
+Work = Callable[[int, int, NDArray[np.float32], NDArray[np.int32]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """What is known of a stack's observations."""
+
+    white: NDArray[np.float32]
+    """(K,) value from which observations of an image are saturated; infinity for none."""
+    noise: float
+    """Standard deviation of an observation, fraction of full scale."""
 
 
 def linearize(
@@ -25,19 +41,25 @@ def linearize(
     base_images: tuple[int, int, int],
     thresholds: Thresholds,
     options: Options,
+    quality: Quality | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
-) -> NDArray[np.float32]:
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Linearized bases of all mask pixels.
 
-    `robust` samples among the images in which a pixel is lit until enough is known, then fits
-    its D observations; the published methods draw `options.samples` triples among all images but
-    the bases, the same for all pixels.
+    `robust` samples among the images in which a pixel is lit until enough is known, then fits all
+    its lit observations, weighted by how well they fit; the published methods draw
+    `options.samples` triples among all images but the bases, the same for all pixels.
+
+    Args:
+        quality: what `robust` makes use of; nothing is known when left out.
 
     Returns:
         (3,H,W) signed, fraction of full scale; 0 outside the mask; NaN where `robust` finds a
-        pixel lit in fewer than three images, which determines nothing.
+        pixel lit in fewer than three images, which determines nothing. (P,) margin of each mask
+        pixel: votes by which the winner beats the best different solution; 0 by the published
+        methods.
 
     Raises:
         DegenerateError: no three images determine a candidate.
@@ -45,14 +67,16 @@ def linearize(
     """
     _, H, W = stack.shape
     bases = np.zeros((3, H * W), np.float32)
+    margin = np.zeros(len(stack.pixels), np.int32)
     if options.method == "robust":
-        work = consensus_work(stack, coefficients, thresholds, options)
+        known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
+        work = consensus_work(stack, coefficients, thresholds, options, known)
     else:
         work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
 
     def block(start: int, stop: int) -> None:
         out = np.full((stop - start, 3), np.nan, np.float32)
-        work(start, stop, out)
+        work(start, stop, out, margin[start:stop])
         bases[:, stack.pixels[start:stop]] = out.T
 
     run_blocks(
@@ -64,11 +88,15 @@ def linearize(
         progress=progress,
         cancel=cancel,
     )
-    return bases.reshape(3, H, W)
+    return bases.reshape(3, H, W), margin
 
 
 def consensus_work(
-    stack: ImageStack, coefficients: NDArray[np.float64], thresholds: Thresholds, options: Options
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    thresholds: Thresholds,
+    options: Options,
+    quality: Quality,
 ) -> Work:
     """Adaptive consensus on one block of pixels, in the frame where lights are well spread."""
     X = stack.images.reshape(len(stack.images), -1)
@@ -79,12 +107,30 @@ def consensus_work(
     back = (np.linalg.inv(r) * scale).T
     tries = stopping_table(options.samples)
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
+    bright = float(np.quantile(X[:, stack.pixels[:: max(1, len(stack.pixels) // 1000)]], 0.99))
+    reach = np.float32(max(REACH * quality.noise, LEAST_REACH * bright))
+    seed, limit = np.uint64(options.seed), options.samples
 
-    def work(start: int, stop: int, out: NDArray[np.float32]) -> None:
+    def work(start: int, stop: int, out: NDArray[np.float32], margin: NDArray[np.int32]) -> None:
         pixels = stack.pixels[start:stop]
         score = np.empty(len(pixels), np.int32)
-        seed, limit = np.uint64(options.seed), options.samples
-        consensus_rows(X, pixels, A, T, Ts, tries, limit, seed, out, score, 0, len(pixels))
+        consensus_rows(
+            X,
+            pixels,
+            A,
+            quality.white,
+            T,
+            Ts,
+            reach,
+            tries,
+            limit,
+            seed,
+            out,
+            score,
+            margin,
+            0,
+            len(pixels),
+        )
         out[:] = out @ back
 
     return work
@@ -112,7 +158,7 @@ def shared_samples_work(
     keep = int(np.ceil(KEEP * len(triples)))
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
 
-    def work(start: int, stop: int, out: NDArray[np.float32]) -> None:
+    def work(start: int, stop: int, out: NDArray[np.float32], _: NDArray[np.int32]) -> None:
         rows = np.ascontiguousarray(X[:, stack.pixels[start:stop]].T)
         if options.method == "statistical":
             centre_rows(rows, triples, inverses, keep, out, 0, len(rows))

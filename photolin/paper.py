@@ -49,9 +49,10 @@ def compare_with_paper(evaluations: Mapping[Method, Evaluation]) -> str:
         for k, letter in enumerate(rows):
             beside = f"   | {_cells(np.array(published[k]))}" if published else ""
             lines.append(f"{letter:>16}{_cells(evaluation.confusion[k])}{beside}")
-    lines += ["", f"{'':16}   macro %         rms         p99  light error (degrees)"]
+    lines += ["", f"{'':16}   macro %         rms         p99  rms/oracle  light error (degrees)"]
     lines += [
-        f"{method:16}{e.macro:10.2f}  {e.rms:10.6f}  {e.p99:10.6f}  {e.light_error:11.3f}"
+        f"{method:16}{e.macro:10.2f}  {e.rms:10.6f}  {e.p99:10.6f}  {e.oracle_ratio:10.3f}  "
+        f"{e.light_error:11.3f}"
         for method, e in evaluations.items()
     ]
     return "\n".join(lines)

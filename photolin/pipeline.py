@@ -3,20 +3,34 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .coefficients import estimate_coefficients
+from .confidence import doubt_dimensions, doubt_distance, find_doubts, measure_confidence
+from .dimensions import fit_plane
 from .errors import DegenerateError, OptionError
-from .factorize import search_coefficients
+from .factorize import Factorization
+from .factors import Thresholds
 from .label import label_images
-from .linearize import linearize
-from .refine import refine_coefficients
-from .sample import Sample, draw_sample
+from .linearize import Quality, linearize
+from .near_light import compare_regions
+from .sample import Sample, choose_pixels, draw_sample
+from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
+
+
+class Talk(NamedTuple):
+    """How a run is worked on and watched; nothing of it changes the result."""
+
+    threads: int | None
+    progress: Progress | None
+    cancel: Cancel | None
 
 
 def analyze(
@@ -45,34 +59,40 @@ def analyze(
     check_base_images(options, stack)
     if threads is not None and threads < 1:
         raise OptionError(f"threads is {threads}; accepted is 1 or more")
+    # a sum's last digits depend on how many threads of BLAS share it; our own do not
+    with threadpool_limits(1, "blas"):
+        return run_stages(stack, options, Talk(threads, progress, cancel))
+
+
+def run_stages(stack: ImageStack, options: Options, talk: Talk) -> Analysis:
+    """All stages in order, each from the results of those before."""
     seconds: dict[str, float] = {}
-
-    with timed("thresholds", seconds, progress):
-        sample = draw_sample(stack, options.seed)
-        suggestion = suggest_thresholds(sample, options, stack.lights, cancel)
+    with timed("thresholds", seconds, talk.progress):
+        white = find_white(stack)
+        sample = draw_sample(stack, options.seed, white)
+        suggestion = suggest_thresholds(sample, options, stack.lights, talk.cancel)
     thresholds, base_images = suggestion.thresholds, suggestion.starts[0]
-
-    with timed("coefficients", seconds, progress):
-        if stack.lights is not None:
-            coefficients = stack.lights
-        elif options.method == "robust":
-            coefficients = robust_coefficients(sample, suggestion, options, cancel)
-        else:
-            coefficients = estimate_coefficients(
-                stack, base_images, thresholds, options, threads, progress, cancel
-            )
-        coefficients = relate_to_bases(coefficients, base_images)
-
-    with timed("linearize", seconds, progress):
-        bases = linearize(
-            stack, coefficients, base_images, thresholds, options, threads, progress, cancel
+    found = suggestion.found
+    quality = Quality(white, 0.0 if found is None else found.noise.absolute)
+    with timed("coefficients", seconds, talk.progress):
+        coefficients = find_coefficients(stack, suggestion, options, talk)
+    with timed("linearize", seconds, talk.progress):
+        bases, margin = linearize(
+            stack, coefficients, base_images, thresholds, options, quality, *talk
         )
-
-    with timed("classify", seconds, progress):
+    with timed("classify", seconds, talk.progress):
         labels = label_images(
-            stack.images, bases, coefficients, stack.mask, thresholds, threads=threads
+            stack.images, bases, coefficients, stack.mask, thresholds, threads=talk.threads
         )
-
+    with timed("confidence", seconds, talk.progress):
+        confidence = measure_confidence(
+            stack, coefficients, bases, labels, margin, thresholds, quality, talk.threads
+        )
+        doubts = (
+            *doubt_blackness(suggestion),
+            *find_doubts(stack, confidence, thresholds),
+            *doubt_lights(stack, sample, found, options, thresholds),
+        )
     return Analysis(
         options=options,
         thresholds=thresholds,
@@ -87,8 +107,25 @@ def analyze(
         lights=stack.lights,
         files=stack.files,
         notes=(*stack.notes, *describe_choices(options, suggestion)),
-        warnings=(*stack.warnings, *find_doubts(bases, stack)),
+        confidence=confidence,
+        warnings=(*stack.warnings, *doubts),
     )
+
+
+def find_coefficients(
+    stack: ImageStack, suggestion: Suggestion, options: Options, talk: Talk
+) -> NDArray[np.float64]:
+    """Step 1, (K,3): from known lights, as found on the sample, or as published."""
+    base_images = suggestion.starts[0]
+    if stack.lights is not None:
+        coefficients = stack.lights
+    elif options.method == "robust" and suggestion.found is not None:
+        coefficients = suggestion.found.coefficients
+    else:
+        coefficients = estimate_coefficients(
+            stack, base_images, suggestion.thresholds, options, *talk
+        )
+    return relate_to_bases(coefficients, base_images)
 
 
 @contextmanager
@@ -111,17 +148,6 @@ def check_base_images(options: Options, stack: ImageStack) -> None:
         )
 
 
-def robust_coefficients(
-    sample: Sample, suggestion: Suggestion, options: Options, cancel: Cancel | None
-) -> NDArray[np.float64]:
-    """(K,3) on the sample; suggesting T has found them already."""
-    if suggestion.coefficients is not None:
-        return suggestion.coefficients
-    t, seed, limit = suggestion.thresholds, options.seed, options.samples
-    rough = search_coefficients(sample, suggestion.starts, t, seed, limit, cancel)
-    return refine_coefficients(sample, rough, t.T, t.Ts, seed, limit, cancel).coefficients
-
-
 def relate_to_bases(
     coefficients: NDArray[np.float64], base_images: tuple[int, int, int]
 ) -> NDArray[np.float64]:
@@ -140,13 +166,32 @@ def relate_to_bases(
     return related
 
 
+def doubt_lights(
+    stack: ImageStack,
+    sample: Sample,
+    found: Factorization | None,
+    options: Options,
+    thresholds: Thresholds,
+) -> list[str]:
+    """Whether lights found in the sample lie in a plane, or any are near."""
+    if found is None:
+        return []
+    plane = fit_plane(sample, found, thresholds) if stack.lights is None else None
+    rows, columns = np.divmod(choose_pixels(stack, options.seed), stack.shape[2])
+    regions = compare_regions(sample, rows, columns, found, thresholds)
+    # where one dimension is noise, it differs between parts of the picture too
+    return doubt_dimensions(plane) or doubt_distance(regions)
+
+
 def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     """Sentences on what was chosen because it was not given."""
     t = suggestion.thresholds
     notes = []
-    if options.T is None:
+    if options.T is None and suggestion.found is not None:
+        noise = 100 * suggestion.found.noise.relative
         notes.append(
-            f"T = {t.T:g} suggested: from the noise below the fit, {suggestion.noise:.4f} of i"
+            f"T = {t.T:g} suggested: lets pass nearly all noise, whose standard deviation is "
+            f"{noise:.2f} % of the intensity; raise T if diffuse areas are speckled"
         )
     if options.Ts is None:
         notes.append(f"Ts = {t.Ts:g} suggested: the upper end of the shadows' gray levels")
@@ -157,12 +202,11 @@ def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:
     return notes
 
 
-def find_doubts(bases: NDArray[np.float32], stack: ImageStack) -> list[str]:
-    """Sentences on what the result cannot tell."""
-    undetermined = int(np.isnan(bases[0]).sum())
-    if undetermined == 0:
+def doubt_blackness(suggestion: Suggestion) -> list[str]:
+    """Whether a constant lies on all images, as of ambient light or a camera's black level."""
+    if suggestion.offset == 0:
         return []
     return [
-        f"{undetermined} of {len(stack.pixels)} pixels are lit in fewer than three images "
-        "and stay undetermined"
+        f"shadows are not black but {suggestion.offset:.4f} of full scale: ambient light or a "
+        f"black level; subtract it with the option offset ({suggestion.offset:.4f}) or a dark frame"
     ]

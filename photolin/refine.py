@@ -12,12 +12,22 @@ from numpy.typing import NDArray
 
 from .analysis import Cancel
 from .errors import Cancelled, DegenerateError
-from .factorize import MIN_SCORE, NO_START, ROUGH_PIXELS, Factorization, fit_bases, orthogonalize
+from .factorize import (
+    MIN_SCORE,
+    NO_NOISE,
+    NO_START,
+    ROUGH_PIXELS,
+    Factorization,
+    Noise,
+    fit_bases,
+    orthogonalize,
+)
 from .sample import Sample
 
-T_PER_NOISE = 1.8
-"""Trades diffuse pixels lost to noise against highlights lost to T: the best mean of both."""
-MIN_T, MAX_T = 0.008, 0.12
+WITHIN = 0.93
+"""Share of the noise that the suggested T lets pass (1.8 standard deviations of a normal one). It
+trades diffuse pixels lost to noise against highlights lost to T, for the best mean of both."""
+MIN_T, MAX_T = 0.01, 0.12
 FIRST_T = 0.1
 CUT = 3.0
 """Residual, in units of the noise, beyond which an observation is no longer diffuse in the fit."""
@@ -55,18 +65,19 @@ def refine_coefficients(
         DegenerateError: the observations do not determine coefficients.
         Cancelled: `cancel` said so.
     """
-    c, noise = orthogonalize(coefficients), FIRST_T / CUT
+    before = c = orthogonalize(coefficients)
+    noise = Noise(FIRST_T / CUT, 0.0, FIRST_T)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
     few = sample.thin(ROUGH_PIXELS)
     for round_ in range(ROUNDS):
         some = few if round_ < EARLY else sample
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
-        wanted = max(CUT * noise, MIN_T) if T is None else T
+        wanted = max(CUT * noise.relative, MIN_T) if T is None else T
         tolerance = max(min(wanted, FIRST_T), FIRST_T * 0.5**round_)
         bases, score = fit_bases(some, c, tolerance, Ts, seed, limit)
-        noise = lower_noise(some.images, c, bases, tolerance, Ts)
-        width = max(2 * noise, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
+        noise = measure_noise(some.images, c, bases, tolerance, Ts)
+        width = max(2 * noise.relative, FIRST_WIDTH * 0.5**round_, LAST_WIDTH)
         weights = weigh(some, c, bases, score, tolerance, Ts, width)
         if not weights.any():
             raise DegenerateError(NO_START)
@@ -76,24 +87,26 @@ def refine_coefficients(
         c = orthogonalize(c)
         # annealing goes on while it still changes the width, however little the coefficients move
         still = some is sample and change_of_span(before, c) < STILL
-        if still and width <= max(2 * noise, LAST_WIDTH):
+        if still and width <= max(2 * noise.relative, LAST_WIDTH):
             break
+    # the last step has turned the frame that the bases are in, the more the less is determined
+    bases = (np.linalg.lstsq(c, before)[0] @ bases).astype(np.float32)
     return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
 
-def follow_noise(noise: float) -> float:
-    """T for a relative noise (standard deviation of (i - l)/i)."""
-    return float(np.clip(T_PER_NOISE * noise, MIN_T, MAX_T))
+def follow_noise(noise: Noise) -> float:
+    """T that lets all but the tail of the noise pass."""
+    return float(np.clip(noise.tail, MIN_T, MAX_T))
 
 
-def lower_noise(
+def measure_noise(
     images: NDArray[np.float32],
     coefficients: NDArray[np.float64],
     bases: NDArray[np.float32],
     T: float,
     Ts: float,
-) -> float:
-    """Standard deviation of (i - l)/i among D observations with i < l, where no highlight can be.
+) -> Noise:
+    """Noise of the D observations with i < l.
 
     Args:
         images: (K,M)
@@ -101,11 +114,25 @@ def lower_noise(
         bases: (3,M), NaN where unknown.
     """
     l = coefficients.astype(np.float32) @ bases
-    with np.errstate(invalid="ignore", divide="ignore"):
-        short = (l - images) / images
-    short = short[(images >= Ts) & (short > 0) & (short <= T)]
-    # the median of a half-normal is 0.6745 standard deviations
-    return float(np.median(short) / 0.6745) if short.size else 0.0
+    with np.errstate(invalid="ignore"):
+        short = l - images
+        below = (images >= Ts) & (short > 0) & (short <= FIRST_T * images)
+    short, i = short[below], images[below]
+    counted = short <= T * i
+    if not counted.any():
+        return NO_NOISE
+    tail = float(np.quantile(short / i, WITHIN))
+    short, i = short[counted], i[counted]
+    # T i cuts off the noise of dim observations, but not that of bright ones; bright by the fit:
+    # among equally lit pixels the brighter observations are those with less noise below it
+    level = i + short
+    bright = level >= np.median(level)
+    return Noise(half_normal(short / i), half_normal(short[bright]), tail)
+
+
+def half_normal(deviations: NDArray[np.float32]) -> float:
+    """Standard deviation of the normal distribution of whose one side these are."""
+    return float(np.median(deviations) / 0.6745)
 
 
 def weigh(

@@ -27,11 +27,29 @@ class Sample:
         )
 
 
-def draw_sample(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> Sample:
-    """At most `count` mask pixels, drawn without replacement, in image order."""
+def choose_pixels(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> NDArray[np.intp]:
+    """Flat indices of at most `count` mask pixels, drawn without replacement, ascending."""
     pixels = stack.pixels
     if len(pixels) > count:
         rng = np.random.default_rng(seed)
         pixels = np.sort(rng.choice(pixels, count, replace=False))
+    return pixels
+
+
+def draw_sample(
+    stack: ImageStack,
+    seed: int,
+    white: NDArray[np.float32] | None = None,
+    count: int = SAMPLE_PIXELS,
+) -> Sample:
+    """At most `count` mask pixels, drawn without replacement, in image order.
+
+    Args:
+        white: (K,) values from which observations are saturated: those are set to 0, so that they
+            have no say; none when left out.
+    """
+    pixels = choose_pixels(stack, seed, count)
     images = stack.images.reshape(len(stack.images), -1)[:, pixels]
+    if white is not None:
+        images = np.where(images < white[:, None], images, np.float32(0))
     return Sample(np.ascontiguousarray(images), np.ascontiguousarray(images.T))

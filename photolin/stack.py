@@ -98,16 +98,19 @@ def check_mask(mask: NDArray, shape: tuple[int, ...], title: str) -> None:
 
 def check_lights(lights: NDArray, count: int, title: str) -> None:
     """Raise unless `lights` is (count,3), finite, non-zero, with three independent directions."""
-    if lights.ndim != 2 or lights.shape != (count, 3):
+    if lights.shape != (count, 3):
+        numbers = "" if lights.shape[1:] == (3,) else f" of {lights[:1].size} numbers"
         raise InputError(
-            f"{title}: {len(lights)} lights for {count} images; "
+            f"{title}: {len(lights)} lights{numbers} for {count} images; "
             "one line of x y z for each image is accepted"
         )
-    norms = np.linalg.norm(lights, axis=1, keepdims=True)
-    if not np.isfinite(lights).all() or (norms < 1e-9).any():
+    size = np.abs(lights).max(axis=1)
+    if not ((size > 1e-9) & (size < 1e9)).all():
         raise InputError(
-            f"{title}: a light is zero or not finite; x y z with a length above 0 is accepted"
+            f"{title}: a light is zero or not finite; "
+            "x y z of a length from 1e-9 to 1e9 is accepted"
         )
+    norms = np.linalg.norm(lights, axis=1, keepdims=True)
     if np.linalg.svd(lights / norms, compute_uv=False)[2] < 1e-3 * np.sqrt(count):
         raise DegenerateError(
             f"{title}: the lights lie in one plane (fewer than three independent directions); "

@@ -1,12 +1,14 @@
 """T and Ts from the data: the shadow level, and the noise that D observations show."""
 
 from dataclasses import dataclass
+from math import floor, log10
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .analysis import Cancel, Options
 from .bases import choose_bases
+from .errors import OptionError
 from .factorize import (
     Factorization,
     fit_bases,
@@ -14,7 +16,7 @@ from .factorize import (
     search_coefficients,
 )
 from .factors import Thresholds
-from .refine import follow_noise, lower_noise, refine_coefficients
+from .refine import follow_noise, measure_noise, refine_coefficients
 from .sample import Sample
 
 FIRST_T = 0.05
@@ -38,12 +40,12 @@ class Suggestion:
     """(LEVELS/2,) observations in bins of `bin_width` from 0, single images' own peaks left out."""
     bin_width: float
     """Fraction of full scale."""
-    noise: float
-    """Standard deviation of (i - l)/i below the fit, where no highlight can be."""
+    offset: float
+    """Gray level of the darkest shadows, fraction of full scale; 0 where they are black."""
     starts: tuple[tuple[int, int, int], ...]
     """Choices of base images, best first."""
-    coefficients: NDArray[np.float64] | None
-    """(K,3) of the provisional linearization; None where T was given."""
+    found: Factorization | None
+    """The linearization of the sample that shows the noise; None where nothing asked for it."""
 
 
 def suggest_thresholds(
@@ -54,9 +56,9 @@ def suggest_thresholds(
 ) -> Suggestion:
     """Thresholds for a stack; T or Ts given in `options` are kept.
 
-    Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T is
-    a multiple of the noise seen on the negative side (i < l) of D residuals, where highlights
-    cannot be, after a provisional linearization.
+    Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T lets
+    pass all but the tail of the residuals seen below the fit (i < l), where highlights cannot be,
+    after linearizing the sample.
 
     Args:
         lights: (K,3) where known; coefficients are then not estimated.
@@ -65,23 +67,19 @@ def suggest_thresholds(
         DegenerateError: the images do not determine coefficients.
     """
     histogram, bin_width = dark_histogram(sample.images)
-    Ts = options.Ts if options.Ts is not None else round(bin_width * shadow_bins(histogram), 4)
+    Ts = options.Ts if options.Ts is not None else shorten(bin_width * shadow_bins(histogram))
     starts = find_starts(sample, Ts, options, lights)
     T, found = options.T, None
+    if T is None or options.method == "robust":
+        found = linearize_sample(sample, starts, Ts, options, lights, cancel)
     if T is None:
-        found = provisional(sample, starts, Ts, options, lights, cancel)
+        assert found is not None
         T = round(follow_noise(found.noise), 4)
-    return Suggestion(
-        Thresholds(T, Ts),
-        histogram,
-        bin_width,
-        0.0 if found is None else found.noise,
-        tuple(starts),
-        None if found is None else found.coefficients,
-    )
+    offset = bin_width * offset_bins(histogram, int((sample.images <= 0).sum()))
+    return Suggestion(Thresholds(T, Ts), histogram, bin_width, offset, tuple(starts), found)
 
 
-def provisional(
+def linearize_sample(
     sample: Sample,
     starts: list[tuple[int, int, int]],
     Ts: float,
@@ -89,20 +87,20 @@ def provisional(
     lights: NDArray[np.float64] | None,
     cancel: Cancel | None,
 ) -> Factorization:
-    """A factorization with the noise that shows in it."""
-    seed, limit = options.seed, options.samples
+    """Coefficients (those of the lights, where known) and bases of the sample, and the noise."""
+    T, seed, limit = options.T, options.seed, options.samples
     if lights is None:
-        first = Thresholds(FIRST_T, Ts)
+        first = Thresholds(FIRST_T if T is None else T, Ts)
         rough = search_coefficients(sample, starts, first, seed, limit, cancel)
-        return refine_coefficients(sample, rough, None, Ts, seed, limit, cancel)
+        return refine_coefficients(sample, rough, T, Ts, seed, limit, cancel)
     c = orthogonalize(lights)
 
-    def at(T: float) -> Factorization:
-        bases, score = fit_bases(sample, c, T, Ts, seed, limit)
-        noise = lower_noise(sample.images, c, bases, T, Ts)
+    def at(tolerance: float) -> Factorization:
+        bases, score = fit_bases(sample, c, tolerance, Ts, seed, limit)
+        noise = measure_noise(sample.images, c, bases, tolerance, Ts)
         return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
-    return at(follow_noise(at(FIRST_T).noise))
+    return at(follow_noise(at(FIRST_T).noise) if T is None else T)
 
 
 def find_starts(
@@ -127,6 +125,29 @@ def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], fl
     return np.sort(rows, axis=0)[:-2].sum(axis=0).astype(np.float64), bin_width
 
 
+def shorten(level: float) -> float:
+    """Rounded to four decimals, or to two digits where that is finer, as on very dark stacks."""
+    return round(level, max(4, 1 - floor(log10(level)))) if level > 0 else 0.0
+
+
+def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:
+    """Bins of `dark_histogram` below the shadows' own level: light that all images share.
+
+    Shadows around a level that is not zero leave the bins below it empty, and no observation is
+    exactly black; noise clipped at zero makes nearly half of them so.
+
+    Args:
+        blacks: observations that are exactly 0.
+    """
+    smooth = np.convolve(np.pad(histogram, 2), SMOOTHING, mode="valid")
+    grays = np.median(smooth[GRAYS])
+    peak = int(np.argmax(smooth[:CEILING]))
+    below = smooth[: max(peak - 1, 0)]
+    if smooth[peak] <= 2 * grays or not below.size or below.min() > 0.5 * smooth[peak]:
+        return 0.0
+    return 0.0 if blacks > 0.2 * histogram[: 2 * peak + 1].sum() else peak + 0.5
+
+
 def shadow_bins(histogram: NDArray[np.float64]) -> int:
     """How many bins of `dark_histogram` the shadows fill; FLOOR where they are exactly dark."""
     smooth = np.convolve(np.pad(histogram, 2, mode="edge"), SMOOTHING, mode="valid")
@@ -136,3 +157,47 @@ def shadow_bins(histogram: NDArray[np.float64]) -> int:
         return FLOOR
     above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
     return peak + int(above[0]) + 1 if above.size else CEILING
+
+
+@dataclass(frozen=True)
+class ShadowLevel:
+    """Ts between sampled shadows and sampled lit pixels."""
+
+    Ts: float
+    """Fraction of full scale."""
+    error: float
+    """Share of the samples on the wrong side, each kind counted alike; 0 to 1."""
+
+
+def sample_shadow_level(
+    shadows: NDArray[np.floating], lit: NDArray[np.floating] | None = None
+) -> ShadowLevel:
+    """Ts the paper's way: from pixels that someone points out as shadow, and as lit.
+
+    With both, the level that puts the smallest share on the wrong side, in the middle of the
+    levels that do so equally; with shadows alone, three of their standard deviations above their
+    mean, at least their maximum.
+
+    Args:
+        shadows: sampled intensities in shadow, fraction of full scale; at least one.
+        lit: sampled intensities in light.
+
+    Raises:
+        OptionError: no shadow is sampled.
+    """
+    dark = np.sort(np.asarray(shadows, np.float64).ravel())
+    if dark.size == 0:
+        raise OptionError("no shadow pixel is sampled; at least one is needed for Ts")
+    bright = np.sort(np.asarray([] if lit is None else lit, np.float64).ravel())
+    if bright.size == 0:
+        return ShadowLevel(float(max(dark.mean() + 3 * dark.std(), np.nextafter(dark[-1], 1))), 0.0)
+    # an observation is shadow when i < Ts: the candidates lie between neighbouring samples
+    values = np.unique(np.concatenate([dark, bright]))
+    levels = np.concatenate(
+        [[values[0]], (values[1:] + values[:-1]) / 2, [np.nextafter(values[-1], 2)]]
+    )
+    wrong_dark = 1 - np.searchsorted(dark, levels, side="left") / dark.size
+    wrong_lit = np.searchsorted(bright, levels, side="left") / bright.size
+    error = (wrong_dark + wrong_lit) / 2
+    best = np.flatnonzero(error == error.min())
+    return ShadowLevel(float(levels[best[len(best) // 2]]), float(error.min()))

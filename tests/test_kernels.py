@@ -12,7 +12,13 @@ from test_factors import SETTINGS, plane
 
 from photolin.consensus import stopping_table
 from photolin.factors import OUTSIDE, Thresholds, classify
-from photolin.kernels import centre_rows, consensus_rows, label_rows, support_rows
+from photolin.kernels import (
+    centre_rows,
+    consensus_rows,
+    evidence_rows,
+    label_rows,
+    support_rows,
+)
 from photolin.kernels.consensus import UNFIT
 
 f32, f64 = np.float32, np.float64
@@ -185,23 +191,33 @@ def judge(x: Array, a: Array, v: Array, T: Array) -> tuple[int, Array, float]:
     d = np.abs(excess) <= slack
     u = ~d & ((excess < 0) | (l < 0))
     ratio = excess[d] / slack[d]
-    return int(d.sum()) - int(u.sum()), d, float(np.cumsum([0, *(ratio * ratio)], dtype=f64)[-1])
+    return int(d.sum()) - int(u.sum()), d, float(np.sum(ratio * ratio))
 
 
-def least_squares(x: Array, a: Array) -> Array | None:
-    """v nearest to a v = x; None where it is not determined."""
-    b = a.astype(f64)
+def least_squares(x: Array, a: Array, w: Array | None = None) -> Array | None:
+    """v nearest to a v = x, with weights w; None where it is not determined."""
+    b, u = a.astype(f64), np.ones(len(a)) if w is None else np.sqrt(w.astype(f64))
+    b = b * u[:, None]
     G = b.T @ b
     if len(b) < 3 or not np.linalg.det(G) > 1e-9 * np.prod(np.diagonal(G)):
         return None
-    return np.linalg.solve(G, b.T @ x.astype(f64)).astype(f32)
+    return np.linalg.lstsq(b, x * u)[0].astype(f32)
+
+
+def differ(v: Array, w: Array) -> bool:
+    return bool(np.sum((v - w) ** 2) > 0.01 * max(np.sum(v**2), np.sum(w**2)))
 
 
 def consensus(
     x: Array, a: Array, T: Array, tries: Array, limit: int, state: int, guess: Array
-) -> tuple[int, Array]:
-    """Best score and solution for lit observations x (n,) with factors a (n,3)."""
-    best, score, diffuse, misfit = guess.copy(), UNFIT, 0, 0.0
+) -> tuple[int, Array, int, bool]:
+    """Best score and solution for lit observations x (n,) with factors a (n,3), and the margin.
+
+    Last whether equal scores were settled by misfits that differ by rounding alone, as those of
+    exact fits to three do: the loop sums in another order.
+    """
+    close = False
+    best, score, diffuse, misfit, second = guess.copy(), UNFIT, 0, 0.0, UNFIT
     if np.isfinite(guess[0]):
         score, d, misfit = judge(x, a, best, T)
         diffuse = int(d.sum())
@@ -212,8 +228,12 @@ def consensus(
         v = solve_exactly(x, a, ijk)
         for step in range(3 if v is not None else 0):
             s, d, e = judge(x, a, v, T)
+            if score > UNFIT and differ(v, best):
+                second = max(second, min(s, score))
             if s < score:
                 break
+            even = s == score and abs(e - misfit) <= 1e-6 + 1e-5 * misfit
+            close |= even and not np.allclose(v, best, atol=1e-4)
             if s > score or e < misfit:
                 best, score, diffuse, misfit = v.copy(), s, int(d.sum()), e
             elif step > 0:
@@ -223,35 +243,91 @@ def consensus(
                 break
     if score == UNFIT and (v := least_squares(x, a)) is not None:
         best, score = v, judge(x, a, v, T)[0]
-    return score, best
+    return score, best, max(0, score - max(second, -len(x))), close
+
+
+def polish(x: Array, a: Array, reach: float, v: Array) -> Array:
+    """Two rounds of least squares with Tukey's biweight."""
+    for _ in range(2):
+        w = np.maximum(0, 1 - ((x - a @ v) / reach) ** 2) ** 2
+        better = least_squares(x, a, w) if w.sum() >= 3.5 else None
+        if better is None:
+            break
+        v = better
+    return v
+
+
+def fit(
+    X: Array,
+    A: Array,
+    T: float,
+    Ts: float = 0.01,
+    *,
+    limit: int = 500,
+    stop: bool = True,
+    seed: int = 0,
+    white: Array | None = None,
+    reach: float = 0.0,
+    out: Array | None = None,
+    columns: Array | None = None,
+) -> tuple[Array, Array, Array]:
+    """Winners, scores and margins of the columns of X (M,N) by the compiled loop.
+
+    Without `stop`, all `limit` samples are drawn.
+    """
+    columns = np.arange(X.shape[1]) if columns is None else columns
+    out = np.full((len(columns), 3), np.nan, f32) if out is None else out
+    score, margin = np.full(len(columns), 77, np.int32), np.full(len(columns), 77, np.int32)
+    white = np.full(len(X), np.inf, f32) if white is None else white
+    tries = stopping_table(limit) if stop else np.full(65, limit)
+    consensus_rows(
+        *(np.ascontiguousarray(X, f32), columns, np.ascontiguousarray(A, f32), white),
+        *(f32(T), f32(Ts), f32(reach), tries, limit, np.uint64(seed)),
+        *(out, score, margin, 0, len(columns)),
+    )
+    return out, score, margin
 
 
 @pytest.mark.parametrize("limit", [1, 5, 500])
 @pytest.mark.parametrize("guessed", [False, True])
-def test_consensus_is_the_twins(limit: int, guessed: bool) -> None:
-    X, A, V = problem(7, 120, 14)
+@pytest.mark.parametrize("reach", [0.0, 0.03])
+def test_consensus_is_the_twins(limit: int, guessed: bool, reach: float) -> None:
+    X, A, V = problem(7, 120, 40)
     A[:, 5] = np.nan
     X[:3, 2:] = 0  # lit in two
     X[3, 3:] = 0  # lit in three
     seed, tries = 123456789, stopping_table(limit)
+    white = np.where(np.arange(40) % 2 == 0, f32(0.8), f32(np.inf)).astype(f32)
     columns = np.arange(119, -1, -1)
     guess = np.where(np.arange(120) % 2 == 0, V.T * f32(1.02), np.nan).T[columns]
-    out = guess.astype(f32) if guessed else np.full((120, 3), np.nan, f32)
-    score = np.zeros(120, np.int32)
-    T, Ts, start = f32(0.05), f32(0.02), out.copy()
-    args = (T, Ts, tries, limit, np.uint64(seed), out, score, 0, 120)
-    consensus_rows(np.ascontiguousarray(X.T), columns, A, *args)
+    start = guess.astype(f32) if guessed else np.full((120, 3), np.nan, f32)
+    T, Ts = f32(0.05), f32(0.02)
+    out, score, margin = fit(
+        *(X.T, A, T, Ts),
+        **{"limit": limit, "seed": seed, "white": white, "reach": reach},
+        **{"out": start.copy(), "columns": columns},
+    )
+    assert (X >= white).sum() > 100
+    moved = settled_by_rounding = 0
     for r, column in enumerate(columns):
         x = X[column]
-        lit = (x >= Ts) & (x > 0) & np.isfinite(A[0])
+        lit = (x >= Ts) & (0 < x) & (x < white) & np.isfinite(A[0])
         if lit.sum() < 3:
-            assert score[r] == UNFIT
+            assert (score[r], margin[r]) == (UNFIT, 0)
             assert np.isnan(out[r]).all()
             continue
         state = seed ^ (int(column) * 0xD1342543DE82EF95 % 2**64)
-        s, v = consensus(x[lit], A[:, lit].T, T, tries, limit, state, start[r])
+        s, v, lead, close = consensus(x[lit], A[:, lit].T, T, tries, limit, state, start[r])
         assert score[r] == s
-        np.testing.assert_allclose(out[r], v, rtol=1e-5, atol=1e-6, equal_nan=True)
+        if close:
+            settled_by_rounding += 1
+            continue
+        assert margin[r] == lead
+        w = polish(x[lit], A[:, lit].T, reach, v) if reach and s != UNFIT else v
+        moved += bool(np.abs(w - v).max() > 1e-3)
+        np.testing.assert_allclose(out[r], w, rtol=2e-5, atol=2e-6, equal_nan=True)
+    assert (moved > 20) == (reach > 0)
+    assert settled_by_rounding <= 12
 
 
 def test_the_twins_random_bits_are_those_of_the_published_generator() -> None:
@@ -273,22 +349,17 @@ def test_the_twins_random_bits_are_those_of_the_published_generator() -> None:
 def test_factors_in_a_plane_are_unfit() -> None:
     X, A, _ = problem(8, 5, 20)
     A[2] = A[0] - 2 * A[1]
-    out, score = np.full((5, 3), np.nan, f32), np.zeros(5, np.int32)
-    tries, T = stopping_table(50), f32(0.05)
-    columns = np.arange(5)
-    args = (T, f32(0.0), tries, 50, np.uint64(0), out, score, 0, 5)
-    consensus_rows(np.ascontiguousarray(X.T), columns, A, *args)
+    out, score, margin = fit(X.T, A, 0.05, 0.0, limit=50, reach=0.1)
     assert (score == UNFIT).all()
+    assert (margin == 0).all()
     assert np.isnan(out).all()
 
 
 def test_where_no_sample_is_apart_enough_all_observations_are_fitted() -> None:
     rng = np.random.default_rng(9)
-    A = np.stack([np.ones(20), *rng.normal(0, 0.03, (2, 20))]).astype(f32)
-    x = (np.array([0.5, 0.2, -0.3]) @ A).astype(f32)
-    out, score = np.full((1, 3), np.nan, f32), np.zeros(1, np.int32)
-    args = (f32(0.05), f32(0.0), stopping_table(50), 50, np.uint64(0), out, score, 0, 1)
-    consensus_rows(x[:, None], np.arange(1), A, *args)
+    A = np.stack([np.ones(20), *rng.normal(0, 0.03, (2, 20))])
+    x = np.array([0.5, 0.2, -0.3]) @ A
+    out, score, _ = fit(x[:, None], A, 0.05, 0.0, limit=50)
     np.testing.assert_allclose(out[0], [0.5, 0.2, -0.3], atol=1e-5)
     assert score[0] == 20
 
@@ -296,12 +367,159 @@ def test_where_no_sample_is_apart_enough_all_observations_are_fitted() -> None:
 def test_a_vote_against_physics_outweighs_a_vote_for() -> None:
     """Two planes explain as many lit observations; the one that leaves darker ones loses."""
     rng = np.random.default_rng(9)
-    A = rng.uniform(0.3, 1, (3, 16)).astype(f32)
-    low = np.array([0.2, 0.2, 0.2], f32) @ A
-    x = low.copy()
-    x[8:] = np.array([0.5, 0.4, 0.45], f32) @ A[:, 8:]
-    out, score = np.full((1, 3), np.nan, f32), np.zeros(1, np.int32)
-    args = (f32(0.01), f32(0.01), stopping_table(2000), 2000, np.uint64(1), out, score, 0, 1)
-    consensus_rows(x[:, None], np.arange(1), A, *args)
+    A = rng.uniform(0.3, 1, (3, 16))
+    x = np.full(3, 0.2) @ A
+    x[8:] = np.array([0.5, 0.4, 0.45]) @ A[:, 8:]
+    out, score, margin = fit(x[:, None], A, 0.01, limit=2000, seed=1)
     np.testing.assert_allclose(out[0], 0.2, atol=1e-4)
     assert score[0] == 8
+    assert 1 <= margin[0] <= 8
+
+
+# The votes the winner is ahead
+
+
+def two_solutions(first: int, second: int, seed: int) -> tuple[Array, Array]:
+    """Observations (1,M) and factors (3,M): `first` of one solution, then `second` of another."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, first + second))
+    one, other = np.array([0.3, 0.2, 0.4]), np.array([0.4, -0.3, 0.2])
+    # each solution sees the other's observations as highlights, which have no vote
+    A *= np.sign(one @ A)
+    x = one @ A
+    x[first:] = other @ A[:, first:]
+    A[:, first:] *= np.sign(x[first:])
+    x = np.abs(x)
+    lower = np.where(np.arange(first + second) < first, other @ A, one @ A)
+    keep = (lower > 0) & (lower < 0.9 * x)
+    return x[keep][:, None], A[:, keep]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_margin_is_the_winners_lead_over_the_best_different_solution(seed: int) -> None:
+    x, A = two_solutions(60, 40, seed)
+    one = (np.abs(np.array([0.3, 0.2, 0.4]) @ A - x[:, 0]) < 1e-6).sum()
+    other = len(x) - one
+    _, score, margin = fit(x, A, 1e-3, stop=False, seed=seed)
+    assert score[0] == max(one, other)
+    assert margin[0] == abs(one - other)
+    assert min(one, other) >= 5
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_where_two_solutions_have_equal_votes_the_margin_is_nothing(seed: int) -> None:
+    """Whichever is seen first."""
+    x, A = two_solutions(60, 60, 3)
+    one = np.flatnonzero(np.abs(np.array([0.3, 0.2, 0.4]) @ A - x[:, 0]) < 1e-6)
+    other = np.setdiff1d(np.arange(len(x)), one)
+    n = min(len(one), len(other))
+    both = np.concatenate([one[:n], other[:n]])
+    _, score, margin = fit(x[both], A[:, both], 1e-3, stop=False, seed=seed)
+    assert score[0] == n
+    assert margin[0] == 0
+
+
+def test_the_margin_counts_from_the_lowest_score_where_nothing_else_was_tried() -> None:
+    X, A, V = problem(5, 1, 12, outliers=0)
+    x = np.abs(V @ A)
+    A = A * np.sign(V @ A)
+    _, score, margin = fit(x.T, A, 0.01, 0.0)
+    assert score[0] == 12
+    assert margin[0] == 24
+
+
+# The last, weighted fit
+
+
+def test_the_polish_is_more_accurate_than_the_equal_weights_of_D() -> None:
+    """T i drops dim observations that noise has moved and keeps tails of highlights."""
+    rng = np.random.default_rng(0)
+    A, V = rng.uniform(0.1, 1, (3, 24)), rng.uniform(0.05, 0.4, (3, 400))
+    X = A.T @ V + rng.normal(0, 0.005, (24, 400))
+    X += np.where(rng.random(X.shape) < 0.2, rng.uniform(0.01, 0.05, X.shape), 0)
+    error = [
+        np.sqrt(np.mean((fit(X, A, 0.05, reach=reach)[0].T - V) ** 2)) for reach in (0.0, 0.02)
+    ]
+    assert error[1] < 0.8 * error[0]
+
+
+def test_too_little_weight_leaves_the_winner_as_it_is() -> None:
+    X, A, V = problem(6, 40, 6, outliers=0)
+    plain, score, _ = fit(X.T, A, 0.05, 0.02)
+    tiny, same, _ = fit(X.T, A, 0.05, 0.02, reach=1e-6)
+    np.testing.assert_array_equal(tiny, plain)
+    np.testing.assert_array_equal(same, score)
+
+
+# Saturation
+
+
+def test_saturated_observations_never_vote() -> None:
+    """Whatever their value: the result is that without them, bit for bit."""
+    X, A, _ = problem(11, 60, 16)
+    white = np.full(16, 0.5, f32)
+    hidden = np.where(X >= 0.5, 0, X)
+    clipped, wild = np.minimum(X, f32(0.5)), np.where(X >= 0.5, f32(0.9), X)
+    assert (X >= 0.5).mean() > 0.2
+    expected = fit(hidden.T, A, 0.05, 0.0, reach=0.02)
+    for shown in (clipped, wild):
+        for a, b in zip(fit(shown.T, A, 0.05, 0.0, white=white, reach=0.02), expected, strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert (fit(clipped.T, A, 0.05, 0.0, reach=0.02)[0] != expected[0]).any()
+
+
+# Evidence
+
+
+def evidence(
+    X: Array, labels: Array, columns: Array, A: Array, white: Array, Ts: float
+) -> tuple[Array, Array, Array]:
+    lit = ((X >= f32(Ts)) & (X < white[:, None])).sum(axis=0)[columns]
+    diffuse, spread = (labels == 1).sum(axis=0)[columns], []
+    for p in columns:
+        c = A[:, labels[:, p] == 1].astype(f64)
+        G = c @ c.T
+        spread.append(np.linalg.det(G) / (np.trace(G) / 3) ** 3 if c.shape[1] >= 3 else 0)
+    return lit, diffuse, np.array(spread)
+
+
+def test_evidence_is_the_twins() -> None:
+    rng = np.random.default_rng(12)
+    K, N = 14, 300
+    X, labels = rng.random((K, N)).astype(f32), rng.integers(0, 5, (K, N)).astype(np.uint8)
+    X[rng.random(X.shape) < 0.1] = 0.3  # exactly Ts
+    X[rng.random(X.shape) < 0.1] = 0.9  # exactly white
+    labels[:, :20] = 4
+    labels[:2, :20] = 1
+    labels[2, 10:20] = 1
+    A = rng.normal(size=(3, K)).astype(f32)
+    white = np.where(np.arange(K) < 9, f32(0.9), f32(np.inf)).astype(f32)
+    columns = rng.permutation(N)[:250]
+    lit, diffuse = np.full(250, 77, np.uint16), np.full(250, 77, np.uint16)
+    spread = np.full(250, 77, f32)
+    evidence_rows(X, labels, columns, A, white, f32(0.3), lit, diffuse, spread, 3, 240)
+    expected = evidence(X, labels, columns, A, white, 0.3)
+    np.testing.assert_array_equal(lit[3:240], expected[0][3:240])
+    np.testing.assert_array_equal(diffuse[3:240], expected[1][3:240])
+    np.testing.assert_allclose(spread[3:240], expected[2][3:240], rtol=1e-5, atol=1e-6)
+    for array in (lit, diffuse, spread):
+        assert (array[:3] == 77).all()
+        assert (array[240:] == 77).all()
+
+
+@pytest.mark.parametrize(("directions", "expected"), [("even", 1), ("plane", 0), ("narrow", 0.02)])
+def test_spread_is_one_for_even_lights_and_none_in_a_plane(
+    directions: str, expected: float
+) -> None:
+    A = np.array([[1, 0, 0, -1, 0, 0], [0, 1, 0, 0, -1, 0], [0, 0, 1, 0, 0, -1]])
+    if directions == "plane":
+        A[2] = 0
+    if directions == "narrow":
+        A = A * 0.1 + np.array([[0], [0], [1]])
+    X, labels = np.ones((6, 1), f32), np.ones((6, 1), np.uint8)
+    counts, spread = np.empty((2, 1), np.uint16), np.empty(1, f32)
+    white = np.full(6, np.inf, f32)
+    columns = np.zeros(1, np.int64)
+    evidence_rows(X, labels, columns, A.astype(f32), white, f32(0), *counts, spread, 0, 1)
+    assert spread[0] == pytest.approx(expected, abs=0.02)
+    assert counts.ravel().tolist() == [6, 6]

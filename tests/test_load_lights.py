@@ -86,7 +86,7 @@ def test_files_that_hold_no_lights_are_refused(tmp_path: Path) -> None:
     for name, words in (
         ("a.txt", "is not text"),
         ("a.npy", "is not a plain array file"),
-        ("b.npy", "1 lights for 6 images"),
+        ("b.npy", "1 lights of 1 numbers for 6 images"),
         ("d.npy", "holds no numbers"),
         ("c.txt", "cannot be read"),
         ("c.npy", "is not a plain array file"),

@@ -29,7 +29,7 @@ def test_a_sample_holds_different_mask_pixels_in_order_and_both_layouts(count: i
 
 def test_the_seed_decides_which_pixels() -> None:
     stack, _ = lambertian()
-    one, same, other = (draw_sample(stack, seed, 100).images for seed in (1, 1, 2))
+    one, same, other = (draw_sample(stack, seed, count=100).images for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, same)
     assert (one != other).any()
 
@@ -42,7 +42,7 @@ def test_a_sample_covers_the_whole_picture() -> None:
 
 @pytest.mark.parametrize(("count", "left"), [(7, 8), (50, 50), (51, 100), (100, 100), (999, 100)])
 def test_thinning_keeps_evenly_spaced_pixels(count: int, left: int) -> None:
-    s = draw_sample(lambertian()[0], 0, 100)
+    s = draw_sample(lambertian()[0], 0, count=100)
     thin = s.thin(count)
     assert thin.images.shape[1] == left
     np.testing.assert_array_equal(thin.pixels, thin.images.T)

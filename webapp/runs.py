@@ -11,6 +11,7 @@ from photolin.errors import Cancelled
 from photolin.factors import Thresholds
 from photolin.pipeline import analyze
 from photolin.sample import draw_sample
+from photolin.saturation import find_white
 from photolin.stack import ImageStack
 from photolin.thresholds import suggest_thresholds
 
@@ -58,7 +59,7 @@ class Runs:
         free = replace(self.options, T=None, Ts=None)
         with tell_compiling(progress) as told:
             told("finding thresholds", 0.5)
-            sample = draw_sample(self.stack, free.seed)
+            sample = draw_sample(self.stack, free.seed, find_white(self.stack))
             return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
 
     @contextmanager

@@ -13,8 +13,15 @@ A dark observation (i < Ts) is A or C whatever v says, so it adds the same const
 of every candidate: only lit observations are ever compared.
 """
 
-from .consensus import consensus_rows
-from .labels import label_rows
-from .samples import centre_rows, support_rows
+from pathlib import Path
 
-__all__ = ["centre_rows", "consensus_rows", "label_rows", "support_rows"]
+from .cache import choose_cache
+
+choose_cache(Path(__file__).parent)
+
+from .consensus import consensus_rows  # noqa: E402
+from .evidence import evidence_rows  # noqa: E402
+from .labels import label_rows  # noqa: E402
+from .samples import centre_rows, support_rows  # noqa: E402
+
+__all__ = ["centre_rows", "consensus_rows", "evidence_rows", "label_rows", "support_rows"]

@@ -3,6 +3,10 @@
 import numpy as np
 from numba import njit
 
+MIN_WEIGHT = 3.5
+"""Sum of weights below which a weighted fit would follow single observations."""
+SUMS = {"reassoc", "nsz"}
+"""Lets sums be taken in vectors; nothing else of IEEE arithmetic is given up."""
 UNFIT = -(2**30)
 """Score of no candidate at all."""
 
@@ -37,57 +41,86 @@ def _score(x, a0, a1, a2, n, v, T):  # pragma: no cover
     return diffuse - against, diffuse
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, fastmath=SUMS)
 def _misfit(x, a0, a1, a2, n, v, T):  # pragma: no cover
     """Sum over D of ((i - l) / (T i))^2: settles equal scores."""
-    total = 0.0
+    v0, v1, v2 = v[0], v[1], v[2]
+    total = np.float32(0)
     for m in range(n):
-        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
-        slack = T * x[m]
-        if abs(excess) <= slack and slack > 0:
-            total += (excess / slack) ** 2
+        excess = x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)
+        share = excess / (T * x[m])
+        total += share * share if abs(share) <= 1 else np.float32(0)
     return total
 
 
 @njit(nogil=True, cache=True)
-def _solve(G, h, out):  # pragma: no cover
-    """out = inverse(G) h for symmetric 3x3 float64 G; false where G is singular."""
-    c00 = G[1, 1] * G[2, 2] - G[1, 2] * G[1, 2]
-    c01 = G[0, 2] * G[1, 2] - G[0, 1] * G[2, 2]
-    c02 = G[0, 1] * G[1, 2] - G[0, 2] * G[1, 1]
-    det = G[0, 0] * c00 + G[0, 1] * c01 + G[0, 2] * c02
-    if not det > 1e-9 * G[0, 0] * G[1, 1] * G[2, 2]:
+def _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out):  # pragma: no cover
+    """out = inverse(G) h for symmetric 3x3 G; false where G is singular."""
+    c00 = g11 * g22 - g12 * g12
+    c01 = g02 * g12 - g01 * g22
+    c02 = g01 * g12 - g02 * g11
+    det = g00 * c00 + g01 * c01 + g02 * c02
+    if not det > 1e-9 * g00 * g11 * g22:
         return False
-    c11 = G[0, 0] * G[2, 2] - G[0, 2] * G[0, 2]
-    c12 = G[0, 1] * G[0, 2] - G[0, 0] * G[1, 2]
-    c22 = G[0, 0] * G[1, 1] - G[0, 1] * G[0, 1]
-    out[0] = (c00 * h[0] + c01 * h[1] + c02 * h[2]) / det
-    out[1] = (c01 * h[0] + c11 * h[1] + c12 * h[2]) / det
-    out[2] = (c02 * h[0] + c12 * h[1] + c22 * h[2]) / det
+    c11 = g00 * g22 - g02 * g02
+    c12 = g01 * g02 - g00 * g12
+    c22 = g00 * g11 - g01 * g01
+    out[0] = (c00 * h0 + c01 * h1 + c02 * h2) / det
+    out[1] = (c01 * h0 + c11 * h1 + c12 * h2) / det
+    out[2] = (c02 * h0 + c12 * h1 + c22 * h2) / det
     return True
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, fastmath=SUMS)
 def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
     """Least squares on the D observations of v; false where they do not determine one."""
-    G = np.zeros((3, 3))
-    h = np.zeros(3)
-    count = 0
+    v0, v1, v2 = v[0], v[1], v[2]
+    g00 = g01 = g02 = g11 = g12 = g22 = h0 = h1 = h2 = count = 0.0
     for m in range(n):
-        excess = x[m] - (a0[m] * v[0] + a1[m] * v[1] + a2[m] * v[2])
-        if abs(excess) <= T * x[m]:
-            b0, b1, b2 = np.float64(a0[m]), np.float64(a1[m]), np.float64(a2[m])
-            G[0, 0] += b0 * b0
-            G[0, 1] += b0 * b1
-            G[0, 2] += b0 * b2
-            G[1, 1] += b1 * b1
-            G[1, 2] += b1 * b2
-            G[2, 2] += b2 * b2
-            h[0] += b0 * x[m]
-            h[1] += b1 * x[m]
-            h[2] += b2 * x[m]
-            count += 1
-    return count >= 3 and _solve(G, h, out)
+        excess = x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)
+        w = 1.0 if abs(excess) <= T * x[m] else 0.0
+        b0, b1, b2, y = w * a0[m], w * a1[m], w * a2[m], np.float64(x[m])
+        count += w
+        g00 += b0 * a0[m]
+        g01 += b0 * a1[m]
+        g02 += b0 * a2[m]
+        g11 += b1 * a1[m]
+        g12 += b1 * a2[m]
+        g22 += b2 * a2[m]
+        h0 += b0 * y
+        h1 += b1 * y
+        h2 += b2 * y
+    return count >= 3 and _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out)
+
+
+@njit(nogil=True, cache=True, fastmath=SUMS)
+def _polish(x, a0, a1, a2, n, reach, w, v):  # pragma: no cover
+    """Weighted least squares on all lit observations, from v, into v.
+
+    `w` is scratch, (3,) float64. Weights are Tukey's biweight of the residual, zero from `reach`
+    on: T i would drop dim observations that noise has moved, and keep the tails of highlights.
+    """
+    for _ in range(2):
+        v0, v1, v2 = v[0], v[1], v[2]
+        g00 = g01 = g02 = g11 = g12 = g22 = h0 = h1 = h2 = weight = 0.0
+        for m in range(n):
+            excess = (x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)) / reach
+            u = np.float64(max(np.float32(0), np.float32(1) - excess * excess))
+            u *= u
+            b0, b1, b2, y = u * a0[m], u * a1[m], u * a2[m], np.float64(x[m])
+            weight += u
+            g00 += b0 * a0[m]
+            g01 += b0 * a1[m]
+            g02 += b0 * a2[m]
+            g11 += b1 * a1[m]
+            g12 += b1 * a2[m]
+            g22 += b2 * a2[m]
+            h0 += b0 * y
+            h1 += b1 * y
+            h2 += b2 * y
+        if weight < MIN_WEIGHT or not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, w):
+            return
+        v[0], v[1], v[2] = w[0], w[1], w[2]
 
 
 @njit(nogil=True, cache=True)
@@ -125,17 +158,32 @@ def _sample(x, a0, a1, a2, n, state, out):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
-    """Best v of n lit observations into `best`; returns its score, or UNFIT.
+def _differ(v, w):  # pragma: no cover
+    """Whether two solutions are farther apart than a tenth of the larger one."""
+    apart = (v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2
+    size = max(v[0] ** 2 + v[1] ** 2 + v[2] ** 2, w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+    return apart > 0.01 * size
 
-    `best` holds a first guess, or NaN; `tries` as in `consensus_rows`.
+
+@njit(nogil=True, cache=True)
+def _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, best):  # pragma: no cover
+    """Best v of n lit observations into `best`; returns its score, or UNFIT, and the runner-up's.
+
+    `best` holds a first guess, or NaN; v (float32) and w (float64) are scratch, (3,); `tries` as
+    in `consensus_rows`. The runner-up is the best
+    scored solution that differs from the winner.
     """
-    score, diffuse, misfit = UNFIT, 0, 0.0
-    v = np.empty(3, np.float32)
-    w = np.empty(3, np.float64)
+    score, diffuse, misfit, second = UNFIT, 0, 0.0, UNFIT
+    if not np.isfinite(best[0]):
+        # most pixels show no highlight: then all that is lit is D, and nothing need be drawn
+        v[:] = 0
+        if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
+            best[0], best[1], best[2] = w[0], w[1], w[2]
     if np.isfinite(best[0]):
         score, diffuse = _score(x, a0, a1, a2, n, best, T)
         misfit = _misfit(x, a0, a1, a2, n, best, T)
+        if diffuse == n and n > 3:
+            return score, second
     drawn = 0
     while drawn < min(limit, tries[diffuse * (len(tries) - 1) // n]):
         drawn += 1
@@ -144,6 +192,9 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
             continue
         for step in range(3):
             s, d = _score(x, a0, a1, a2, n, v, T)
+            # whichever wins, the other one is a rival
+            if min(s, score) > second and _differ(v, best):
+                second = min(s, score)
             if s < score:
                 break
             e = _misfit(x, a0, a1, a2, n, v, T)
@@ -155,18 +206,12 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, best):  # pragma: no cover
             if not _refit(x, a0, a1, a2, n, v, T, w):
                 break
             v[0], v[1], v[2] = w[0], w[1], w[2]
-    if score == UNFIT:
-        # all samples lie near a plane: the best that can be said is what fits them all
-        v[:] = 0
-        if _refit(x, a0, a1, a2, n, v, np.float32(np.inf), w):
-            best[0], best[1], best[2] = w[0], w[1], w[2]
-            score, _ = _score(x, a0, a1, a2, n, best, T)
-    return score
+    return score, second
 
 
 @njit(nogil=True, cache=True)
 def consensus_rows(
-    X, columns, A, T, Ts, tries, limit, seed, out, score, start, stop
+    X, columns, A, white, T, Ts, reach, tries, limit, seed, out, score, margin, start, stop
 ):  # pragma: no cover
     """Fit rows start..stop by adaptive sample consensus.
 
@@ -174,31 +219,41 @@ def consensus_rows(
         X: (M,N) float32 observations; row r of the problem is column `columns[r]` of X.
         columns: (R,) int64.
         A: (3,M) float32 factors; an observation whose factors are NaN is left out.
+        white: (M,) float32; an observation from there on is saturated and left out.
         T, Ts: float32 thresholds.
+        reach: float32, residual from which an observation has no weight in the last fit; 0: none.
         tries: (n,) int64 samples needed against the share of D among the lit, 0 to 1.
         limit: the most samples to draw.
         seed: uint64; each row draws its own sequence from it and its column number.
         out: (R,3) float32; first guess (or NaN) in, winner out; NaN where fewer than 3 are lit.
         score: (R,) int32, written: D - U among the lit.
+        margin: (R,) int32, written: score above that of the best different solution seen, 0 where
+            nothing was fitted.
     """
     M = X.shape[0]
     x = np.empty(M, np.float32)
     a0 = np.empty(M, np.float32)
     a1 = np.empty(M, np.float32)
     a2 = np.empty(M, np.float32)
+    v = np.empty(3, np.float32)
+    w = np.empty(3, np.float64)
     for r in range(start, stop):
         column = columns[r]
         n = 0
         for m in range(M):
             value = X[m, column]
-            if value >= Ts and value > 0 and np.isfinite(A[0, m]):
+            if value >= Ts and 0 < value < white[m] and np.isfinite(A[0, m]):
                 x[n], a0[n], a1[n], a2[n] = value, A[0, m], A[1, m], A[2, m]
                 n += 1
         if n < 3:
             out[r] = np.nan
             score[r] = UNFIT
+            margin[r] = 0
             continue
         state = np.uint64(seed) ^ (np.uint64(column) * np.uint64(0xD1342543DE82EF95))
-        score[r] = _fit(x, a0, a1, a2, n, T, tries, limit, state, out[r])
+        score[r], second = _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, out[r])
+        margin[r] = max(0, score[r] - max(second, -n))
         if score[r] == UNFIT:
             out[r] = np.nan
+        elif reach > 0:
+            _polish(x, a0, a1, a2, n, reach, w, out[r])

@@ -31,6 +31,7 @@ class Plan:
     """Whether files may not ask for another transfer."""
     channel: Channel
     region: tuple[slice, slice]
+    offset: float
     dark: Sequence[NDArray] | None = None
 
 
@@ -55,6 +56,7 @@ def make_plan(layout: Layout, options: LoadOptions) -> Plan:
         transfer=first.transfer if options.transfer == "auto" else options.transfer,
         auto=options.transfer == "auto",
         channel=options.channel,
+        offset=options.offset,
         region=(slice(row0, row1), slice(col0, col1)),
     )
     return replace(plan, dark=_read_dark(layout.dark, plan)) if layout.dark else plan
@@ -148,5 +150,11 @@ def _fit(images: NDArray[np.float32], top: float, plan: Plan) -> list[str]:
     if top > 1:
         images /= np.float32(top)
         notes.append(f"scale: values go up to {top:.6g}; all images are divided by that")
+    if plan.offset:
+        images -= np.float32(plan.offset)
+        dim = int(np.count_nonzero(images < 0))
+        notes.append(
+            f"offset: {plan.offset:g} is subtracted; observations below it, taken as 0: {dim}"
+        )
     np.maximum(images, 0, out=images)
     return notes

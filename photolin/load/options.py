@@ -24,6 +24,8 @@ class LoadOptions:
     """Lights file; the layout's own when left out; "none" ignores lights."""
     dark: Path | None = None
     """Image taken with the lights off, subtracted from all; the layout's own when left out."""
+    offset: float = 0.0
+    """Constant subtracted from all images, fraction of full scale: ambient light, black level."""
     roi: tuple[int, int, int, int] | None = None
     """Region to read: row0, row1, column0, column1, half-open; everything when left out."""
 
@@ -34,6 +36,8 @@ class LoadOptions:
         ):
             if value not in kinds:
                 raise OptionError(f"{name} is {value!r}; accepted are {', '.join(kinds)}")
+        if not 0 <= self.offset < 1:
+            raise OptionError(f"offset is {self.offset:g}; accepted is 0 to below 1")
         if self.roi is not None:
             row0, row1, col0, col1 = self.roi
             if not (0 <= row0 < row1 and 0 <= col0 < col1):
