@@ -21,7 +21,7 @@ from viser import _gui_api, _gui_handles, _messages, _viser
 from websockets.sync.client import ClientConnection, connect
 
 from photolin.errors import OptionError
-from webapp import viser_internals
+from webapp import access, viser_internals
 from webapp.access import (
     MAX_CLIENTS,
     SECURITY_HEADERS,
@@ -127,6 +127,8 @@ def test_a_websocket_without_origin_is_refused() -> None:
         ("/", "", False),
         ("/?token=", "", False),
         ("/?token=wrong", "photolin-8080=wrong", False),
+        ("/?token=s3c", "photolin-8080=s3cre", False),
+        ("/?token=s3cretly", "photolin-8080=s3cret1", False),
         ("/", "photolin-8081=s3cret", False),
         ("/", "][;=", False),
         ("/?token=s%C3%A9cret", "", False),
@@ -435,6 +437,11 @@ def test_garbage_and_forbidden_messages_disturb_no_one(
             {**CAMERA, "position": [0, 0]},
             {**CAMERA, "image_height": 10**12},
             {**CAMERA, "extra": 1},
+            {
+                "type": "GuiUpdateMessage",
+                "uuid": uuid,
+                "updates": {"value": msgspec.msgpack.Ext(5, b"")},
+            },
         ):
             hostile.say(message)
         assert hostile.works()
@@ -442,6 +449,16 @@ def test_garbage_and_forbidden_messages_disturb_no_one(
     assert tab.widgets["T"].value == 0.5
     assert shared == []
     assert capfd.readouterr().err == ""
+
+
+def test_a_flood_from_one_client_slows_that_client_alone(app: App, tab: Tab) -> None:
+    with contextlib.closing(Tab(app)) as flooding:
+        for number in range(2000):
+            flooding.update("note", value=str(number))
+        asked = time.perf_counter()
+        assert tab.works()
+        assert (flooding.id, "note", "1999") not in app.seen
+        assert time.perf_counter() - asked < 2000 / access.RATE / 4
 
 
 def test_a_message_over_the_limit_ends_only_its_own_connection(app: App, tab: Tab) -> None:

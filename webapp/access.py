@@ -35,6 +35,11 @@ MAX_CLIENTS = 16
 """Tabs connected at the same time; the next one is refused with 503."""
 MAX_MESSAGE = 1 << 20
 """Bytes a client may send in one message."""
+RATE = 250.0
+"""Messages a second that are read from one client; a page sends 100 at the most. The rest waits in
+its own connection, because all tabs share one event loop."""
+BURST = 250.0
+"""Messages that may come at once after a rest."""
 
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -97,11 +102,16 @@ def open_server(host: str = "127.0.0.1", port: int = 8080, token: str | None = N
     running: list[viser.ViserServer] = []
 
     class Connection(ServerConnection):
-        """Hands on only what one of our own widgets could have sent."""
+        """Hands on only what one of our own widgets could have sent, and not faster than RATE."""
+
+        _paid = 0.0
 
         async def recv(self, decode: bool | None = None) -> Any:
             while True:
                 frame = await super().recv(decode)
+                now = asyncio.get_running_loop().time()
+                self._paid = max(self._paid, now - BURST / RATE) + 1 / RATE
+                await asyncio.sleep(max(0.0, self._paid - now))
                 while not running:  # the constructor of viser has not returned yet
                     await asyncio.sleep(0.01)
                 if (message := sift(frame, running[0])) is not None:

@@ -65,9 +65,10 @@ def sift(frame: object, server: viser.ViserServer) -> bytes | None:
         return None
     try:
         message = _decoder.decode(frame)
-    except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
-        return None
-    if not _is_finite(message):
+        finite = _is_finite(message)
+    except (msgspec.MsgspecError, RecursionError, TypeError, UnicodeDecodeError):
+        return None  # TypeError: a value of a type that is only MessagePack's
+    if not finite:
         return None
     match message:
         case GuiUpdateMessage(uuid, updates):
