@@ -12,6 +12,7 @@ from .stack import ImageStack
 
 KEEP = 0.05
 """Share of the candidates the statistical method ends with at the least."""
+DRAWS = 20
 SINGULAR = 1e-6
 """Normalized determinant below which three observations do not determine a candidate."""
 
@@ -71,12 +72,26 @@ def draw_samples(
 
     Args:
         A: (3,M) factors.
-        count: how many to draw; the singular ones among them are dropped.
+        count: how many; those that are singular are drawn again, up to DRAWS times.
 
     Returns:
         (n,3) observation numbers, (n,3,3) inverses: v = inverse @ x[triple].
     """
-    triples = rng.integers(0, A.shape[1], (count, 3))
+    triples, inverses = np.empty((0, 3), np.int64), np.empty((0, 3, 3), np.float32)
+    for _ in range(DRAWS):
+        drawn = rng.integers(0, A.shape[1], (count, 3))
+        regular, inverse = invert_regular(A, drawn)
+        triples = np.concatenate([triples, regular])[:count]
+        inverses = np.concatenate([inverses, inverse])[:count]
+        if len(triples) == count:
+            break
+    return triples, inverses
+
+
+def invert_regular(
+    A: NDArray[np.floating], triples: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """The triples of factors that determine a candidate, and the inverses of those."""
     rows = A[:, triples].transpose(1, 2, 0).astype(np.float64)
     norms = np.prod(np.linalg.norm(rows, axis=2), axis=1)
     regular = np.abs(np.linalg.det(rows)) > SINGULAR * norms

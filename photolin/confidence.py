@@ -14,6 +14,8 @@ from .near_light import WORTH, Regions
 from .stack import ImageStack
 
 BLOCK = 1 << 14
+JUDGES = 6000
+"""Pixels that judge an image, about."""
 FEW = 4
 """Lit images below which three observations fit whatever they are."""
 MISFIT = 0.08
@@ -21,6 +23,8 @@ MISFIT = 0.08
 GAIN = 0.1
 """Change of exposure, against known light powers, that is worth a word."""
 SATURATED = 0.05
+DIFFUSE = 0.5
+"""Share of the lit observations that are D below which images and lights do not go together."""
 NEAR_RATIO = 6.0
 """Times that the lights of a quarter of the picture differ more than noise makes them."""
 FLAT = 0.85
@@ -66,10 +70,16 @@ def measure_confidence(
         image[stack.pixels] = values
         return image.reshape(H, W)
 
-    step = max(1, P // 20_000)
+    step = max(1, P // JUDGES)
     some = stack.pixels[::step]
+    seen = X[:, some]
+    saturated = seen >= quality.white[:, None]
+    # what is saturated is darker than it should be; as 0 it is not lit
     support, residual, gain = judge_images(
-        X[:, some], coefficients @ bases.reshape(3, -1)[:, some], thresholds, quality.noise
+        np.where(saturated, np.float32(0), seen),
+        coefficients @ bases.reshape(3, -1)[:, some],
+        thresholds,
+        quality.noise,
     )
     return Confidence(
         lit=paint(lit),
@@ -79,7 +89,7 @@ def measure_confidence(
         support=support,
         residual=residual,
         gain=gain,
-        saturated=(X[:, some] >= quality.white[:, None]).mean(axis=1),
+        saturated=saturated.mean(axis=1),
     )
 
 
@@ -131,7 +141,29 @@ def find_doubts(stack: ImageStack, confidence: Confidence, thresholds: Threshold
             f"{100 * few.mean():.0f} % of the pixels are lit in fewer than {FEW} images, so that "
             "nothing checks their linearized values; more images would"
         )
-    return doubts + doubt_images(stack, confidence)
+    share = confidence.saturated.mean()
+    if share > SATURATED:
+        doubts.append(
+            f"{100 * share:.0f} % of the observations are saturated and have no say; shorten the "
+            "exposure"
+        )
+    return doubts + (doubt_model(stack, confidence) or doubt_images(stack, confidence))
+
+
+def doubt_model(stack: ImageStack, confidence: Confidence) -> list[str]:
+    """Whether the images follow the lights at all."""
+    diffuse, lit = confidence.diffuse[stack.mask].sum(), confidence.lit[stack.mask].sum()
+    if diffuse >= DIFFUSE * lit:
+        return []
+    cause = (
+        "the surface may be too glossy"
+        if stack.lights is None
+        else "the lights given may not belong to these images, or not in this order"
+    )
+    return [
+        f"only {100 * diffuse / lit:.0f} % of the lit observations agree with the result within "
+        f"T: {cause}"
+    ]
 
 
 def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
@@ -154,12 +186,6 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
                 f"image {k} ({stack.names[k]}) is {gain[k] / np.median(gain):.2f} times as bright "
                 "as its light power says; another exposure or a flickering light are possible"
             )
-    share = confidence.saturated.mean()
-    if share > SATURATED:
-        doubts.append(
-            f"{100 * share:.0f} % of the observations are saturated and have no say; shorten the "
-            "exposure"
-        )
     return doubts
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from photolin import consensus
-from photolin.consensus import fit_rows, samples_needed, stopping_table
+from photolin.consensus import CONFIDENCE, fit_rows, samples_needed, stopping_table
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_no_inliers_take_forever_and_only_inliers_one_sample() -> None:
 def test_a_tiny_share_never_rounds_to_few_samples(share: float) -> None:
     """log(1 - w^3) rounds to log(1) = 0 below w = 6e-6 and would ask for -inf or 0 samples."""
     n = samples_needed(share)
-    assert n == inf or n == pytest.approx(6.907755 / share**3, rel=1e-4)
+    assert n == inf or n == pytest.approx(-log(1 - CONFIDENCE) / share**3, rel=1e-4)
 
 
 def test_more_inliers_never_take_more_samples() -> None:

@@ -13,7 +13,7 @@ import pytest
 import tifffile
 from PIL import Image
 
-from photolin.analysis import Analysis, Options
+from photolin.analysis import Analysis, Confidence, Options
 from photolin.errors import InputError, OptionError, OutputError
 from photolin.export import (
     export_files,
@@ -54,6 +54,12 @@ def analysis() -> Analysis:
         names=(*(f"img{k}.png" for k in range(K - 2)), "../Größe 1.png", "img 6"),
         seconds={"bases": 0.25, "total": 1 / 3},
         title="vase",
+        confidence=Confidence(
+            **{name: rng.integers(0, K, (H, W)).astype("u2") for name in ("lit", "diffuse")},
+            margin=rng.integers(0, 2**16, (H, W)).astype(np.uint16),
+            spread=rng.random((H, W), np.float32),
+            **{name: rng.random(K) for name in ("support", "residual", "gain", "saturated")},
+        ),
         lights=rng.normal(size=(K, 3)),
         files=(("a/img0.png", "00ff"), ("a/caf\udce9.png", "11ee")),
         notes=("transfer: linear",),
@@ -61,12 +67,15 @@ def analysis() -> Analysis:
     )
 
 
-def equal(a: Analysis, b: Analysis) -> bool:
-    pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in fields(Analysis)]
-    return all(
-        np.array_equal(x, y) and x.dtype == y.dtype if isinstance(x, np.ndarray) else x == y
-        for x, y in pairs
-    )
+def equal(a: object, b: object) -> bool:
+    """Two analyses, or what they hold."""
+    if isinstance(a, Analysis | Confidence):
+        return type(a) is type(b) and all(
+            equal(vars(a)[f.name], vars(b)[f.name]) for f in fields(a)
+        )
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b) and a.dtype == b.dtype
+    return a == b
 
 
 @pytest.fixture
@@ -86,6 +95,36 @@ def test_save_then_load_is_identity_without_lights_and_given_options(
     plain = replace(analysis, lights=None, options=Options(), files=(), notes=(), warnings=())
     save_result(plain, tmp_path)
     assert equal(load_result(tmp_path), plain)
+
+
+def test_results_without_confidence_load_with_none(analysis: Analysis, tmp_path: Path) -> None:
+    """As version 0.1 wrote them."""
+    plain = replace(analysis, confidence=None)
+    save_result(plain, tmp_path)
+    with np.load(tmp_path / "result.npz") as arrays:
+        assert not {"lit", "spread", "gain"} & set(arrays)
+    assert load_result(tmp_path).confidence is None
+    assert equal(load_result(tmp_path), plain)
+    assert not equal(load_result(tmp_path), analysis)
+
+
+def test_a_loaded_confidence_is_read_only(saved: Path) -> None:
+    confidence = load_result(saved).confidence
+    assert confidence is not None
+    for array in vars(confidence).values():
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+
+
+def test_the_report_says_what_each_image_is_worth(analysis: Analysis, saved: Path) -> None:
+    images = json.loads((saved / "report.json").read_text())["images"]
+    c = analysis.confidence
+    assert c is not None
+    for name, values in (
+        *(("possible", c.support), ("residual", c.residual)),
+        *(("gain", c.gain), ("saturated", c.saturated)),
+    ):
+        assert [image[name] for image in images] == values.tolist()
 
 
 def test_saving_what_was_loaded_gives_the_same_bytes(saved: Path, tmp_path: Path) -> None:
@@ -117,6 +156,9 @@ def test_result_npz_holds_the_promised_arrays(analysis: Analysis, saved: Path) -
         "T": ("float64", ()),
         "Ts": ("float64", ()),
         "lights": ("float64", (K, 3)),
+        **{name: ("uint16", (H, W)) for name in ("lit", "diffuse", "margin")},
+        "spread": ("float32", (H, W)),
+        **{name: ("float64", (K,)) for name in ("support", "residual", "gain", "saturated")},
     }
 
 
@@ -390,6 +432,10 @@ def test_an_archive_of_other_arrays_is_refused(saved: Path) -> None:
         good | {"base_images": np.array([0, 1, K])},
         good | {"base_images": np.array([0, 1, 1])},
         good | {"linearized_bases": np.array([None, {}], object)},
+        good | {"lit": good["lit"].astype(np.int64)},
+        good | {"spread": good["spread"].T},
+        good | {"gain": good["gain"][1:]},
+        {name: a for name, a in good.items() if name != "margin"},
     ]
     for arrays in bad:
         np.savez(saved / "result.npz", **arrays)

@@ -218,9 +218,13 @@ def consensus(
     """
     close = False
     best, score, diffuse, misfit, second = guess.copy(), UNFIT, 0, 0.0, UNFIT
-    if np.isfinite(guess[0]):
+    if np.isnan(guess[0]) and (v := least_squares(x, a)) is not None:
+        best = v
+    if np.isfinite(best[0]):
         score, d, misfit = judge(x, a, best, T)
         diffuse = int(d.sum())
+        if d.all() and len(x) > 3:
+            limit = 0
     drawn = 0
     while drawn < min(limit, tries[diffuse * (len(tries) - 1) // len(x)]):
         drawn += 1
@@ -241,8 +245,6 @@ def consensus(
             v = least_squares(x[d], a[d])
             if v is None:
                 break
-    if score == UNFIT and (v := least_squares(x, a)) is not None:
-        best, score = v, judge(x, a, v, T)[0]
     return score, best, max(0, score - max(second, -len(x))), close
 
 
@@ -307,11 +309,11 @@ def test_consensus_is_the_twins(limit: int, guessed: bool, reach: float) -> None
         **{"limit": limit, "seed": seed, "white": white, "reach": reach},
         **{"out": start.copy(), "columns": columns},
     )
-    assert (X >= white).sum() > 100
+    assert np.count_nonzero(white <= X) > 100
     moved = settled_by_rounding = 0
     for r, column in enumerate(columns):
         x = X[column]
-        lit = (x >= Ts) & (0 < x) & (x < white) & np.isfinite(A[0])
+        lit = (x >= Ts) & (x > 0) & (x < white) & np.isfinite(A[0])
         if lit.sum() < 3:
             assert (score[r], margin[r]) == (UNFIT, 0)
             assert np.isnan(out[r]).all()
@@ -326,7 +328,7 @@ def test_consensus_is_the_twins(limit: int, guessed: bool, reach: float) -> None
         w = polish(x[lit], A[:, lit].T, reach, v) if reach and s != UNFIT else v
         moved += bool(np.abs(w - v).max() > 1e-3)
         np.testing.assert_allclose(out[r], w, rtol=2e-5, atol=2e-6, equal_nan=True)
-    assert (moved > 20) == (reach > 0)
+    assert (moved >= 10) == (reach > 0)
     assert settled_by_rounding <= 12
 
 
@@ -420,7 +422,7 @@ def test_where_two_solutions_have_equal_votes_the_margin_is_nothing(seed: int) -
 
 
 def test_the_margin_counts_from_the_lowest_score_where_nothing_else_was_tried() -> None:
-    X, A, V = problem(5, 1, 12, outliers=0)
+    _, A, V = problem(5, 1, 12, outliers=0)
     x = np.abs(V @ A)
     A = A * np.sign(V @ A)
     _, score, margin = fit(x.T, A, 0.01, 0.0)
@@ -444,7 +446,7 @@ def test_the_polish_is_more_accurate_than_the_equal_weights_of_D() -> None:
 
 
 def test_too_little_weight_leaves_the_winner_as_it_is() -> None:
-    X, A, V = problem(6, 40, 6, outliers=0)
+    X, A, _ = problem(6, 40, 6, outliers=0)
     plain, score, _ = fit(X.T, A, 0.05, 0.02)
     tiny, same, _ = fit(X.T, A, 0.05, 0.02, reach=1e-6)
     np.testing.assert_array_equal(tiny, plain)
@@ -474,7 +476,7 @@ def test_saturated_observations_never_vote() -> None:
 def evidence(
     X: Array, labels: Array, columns: Array, A: Array, white: Array, Ts: float
 ) -> tuple[Array, Array, Array]:
-    lit = ((X >= f32(Ts)) & (X < white[:, None])).sum(axis=0)[columns]
+    lit = ((f32(Ts) <= X) & (white[:, None] > X)).sum(axis=0)[columns]
     diffuse, spread = (labels == 1).sum(axis=0)[columns], []
     for p in columns:
         c = A[:, labels[:, p] == 1].astype(f64)

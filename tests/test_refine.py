@@ -1,20 +1,22 @@
 """Weighted factorization: its step against finite differences, the noise it reads, refusals."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 from lambert import lambertian, wrap
 
 from photolin.errors import DegenerateError
 from photolin.evaluate import light_error
-from photolin.factorize import orthogonalize
+from photolin.factorize import NO_NOISE, Noise, orthogonalize
 from photolin.refine import (
     MAX_T,
     MIN_T,
-    T_PER_NOISE,
+    WITHIN,
     change_of_span,
     follow_noise,
     gauss_newton_step,
-    lower_noise,
+    measure_noise,
     refine_coefficients,
 )
 from photolin.sample import draw_sample
@@ -69,14 +71,27 @@ def test_noisy_diffuse_images_are_solved_as_well_as_their_noise_allows() -> None
     start = lights + np.random.default_rng(1).normal(0, 0.03, lights.shape)
     sample = draw_sample(wrap(np.clip(noisy, 0, 1)), 0)
     found = refine_coefficients(sample, start, None, 0.01, 0, 500)
-    assert found.noise == pytest.approx(0.01, rel=0.2)
+    assert found.noise.relative == pytest.approx(0.01, rel=0.2)
     assert light_error(start, lights) > 1
     assert light_error(found.coefficients, lights) < 0.2
 
 
-def test_the_tolerance_is_in_proportion_to_the_noise_within_bounds() -> None:
-    assert follow_noise(0.02) == pytest.approx(T_PER_NOISE * 0.02)
-    assert (follow_noise(0), follow_noise(1)) == (MIN_T, MAX_T)
+def test_bases_and_coefficients_explain_the_images_even_where_a_direction_is_noise() -> None:
+    """There the last step turns the frame: bases left behind in the one before explain nothing."""
+    stack, lights = lambertian(14, coplanar=True)
+    noisy = stack.images + np.random.default_rng(0).normal(0, 0.005, stack.shape)
+    sample = draw_sample(wrap(np.clip(noisy, 0, 1)), 0)
+    start = lights + np.random.default_rng(1).normal(0, 0.1, lights.shape)
+    found = refine_coefficients(sample, start, None, 0.01, 0, 500)
+    excess = np.abs(found.coefficients @ found.bases - sample.images)
+    assert np.median(excess) < 0.005
+    assert np.quantile(excess, 0.9) < 0.02
+
+
+def test_the_tolerance_is_the_tail_of_the_noise_within_bounds() -> None:
+    assert follow_noise(Noise(0.7, 0.7, 0.05)) == 0.05
+    assert follow_noise(NO_NOISE) == MIN_T
+    assert follow_noise(Noise(0.01, 0.01, 1)) == MAX_T
 
 
 def test_noise_is_read_below_the_fit_only_and_from_lit_pixels() -> None:
@@ -86,15 +101,30 @@ def test_noise_is_read_below_the_fit_only_and_from_lit_pixels() -> None:
     i[:, :40_000] += 0.2  # highlights
     i[:, 40_000:50_000] = 0.001  # shadows
     bases = np.concatenate([l, np.zeros((2, l.size))]).astype(np.float32)
-    noise = lower_noise(i.astype(np.float32), np.array([[1.0, 0, 0]]), bases, 0.1, 0.02)
-    assert noise == pytest.approx(0.01, rel=0.05)
+    noise = measure_noise(i.astype(np.float32), np.array([[1.0, 0, 0]]), bases, 0.1, 0.02)
+    assert noise.relative == pytest.approx(0.01, rel=0.03)
+    assert noise.absolute == pytest.approx(0.005, rel=0.03)
+    tail = 0.01 * NormalDist().inv_cdf(0.5 + WITHIN / 2)
+    assert noise.tail == pytest.approx(tail, rel=0.03)
+
+
+def test_noise_of_one_size_is_read_from_the_bright_and_its_tail_beyond_the_tolerance() -> None:
+    """T i cuts off the noise of dim observations, so that they would show too little of it."""
+    rng = np.random.default_rng(0)
+    l = np.concatenate([np.full(50_000, 0.1), np.full(50_000, 0.8)])[None]
+    i = (l + rng.normal(0, 0.01, l.shape)).astype(np.float32)
+    bases = np.concatenate([l, np.zeros((2, l.size))]).astype(np.float32)
+    noise = measure_noise(i, np.array([[1.0, 0, 0]]), bases, 0.04, 0.02)
+    assert noise.absolute == pytest.approx(0.01, rel=0.05)
+    assert noise.relative < 0.02
+    assert noise.tail > 0.07
 
 
 def test_where_nothing_is_below_the_fit_there_is_no_noise() -> None:
     nothing = np.zeros((3, 5), np.float32)
-    assert lower_noise(nothing, np.eye(3), nothing, 0.1, 0.0) == 0
+    assert measure_noise(nothing, np.eye(3), nothing, 0.1, 0.0) == NO_NOISE
     unknown = np.full((3, 5), np.nan, np.float32)
-    assert lower_noise(nothing + 1, np.eye(3), unknown, 0.1, 0.0) == 0
+    assert measure_noise(nothing + 1, np.eye(3), unknown, 0.1, 0.0) == NO_NOISE
 
 
 @pytest.mark.parametrize("T", [None, 0.02])

@@ -66,6 +66,8 @@ def describe_analysis(analysis: Analysis) -> dict[str, Any]:
         }
         for name, row, fitting in zip(analysis.names, inside, supported, strict=True)
     ]
+    for k, image in enumerate(images):
+        image |= describe_confidence(analysis, k)
     return {
         "version": program_version(),
         "title": analysis.title,
@@ -83,6 +85,20 @@ def describe_analysis(analysis: Analysis) -> dict[str, Any]:
             **{f"p{q:02d}": float(np.percentile(per_pixel, q)) for q in (5, 25, 50, 75, 95)},
         },
         "seconds": dict(analysis.seconds),
+    }
+
+
+def describe_confidence(analysis: Analysis, k: int) -> dict[str, float]:
+    """What `Confidence` says of image k; `support` there is `possible` here, by Eq. (5) it is D, A
+    and C among all pixels."""
+    c = analysis.confidence
+    if c is None:
+        return {}
+    return {
+        "possible": float(c.support[k]),
+        "residual": float(c.residual[k]),
+        "gain": float(c.gain[k]),
+        "saturated": float(c.saturated[k]),
     }
 
 

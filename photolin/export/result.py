@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis import Analysis, Options
+from ..analysis import Analysis, Confidence, Options
 from ..errors import InputError, OutputError, PhotolinError
 from ..factors import OUTSIDE, Thresholds
 from ..load import LoadOptions, load_stack
@@ -40,6 +40,18 @@ ARRAYS = {
     "lights": (np.float64, "K3"),
 }
 """Type and axes of each array in result.npz; `lights` is there when the stack had them."""
+
+CONFIDENCE = {
+    "lit": (np.uint16, "HW"),
+    "diffuse": (np.uint16, "HW"),
+    "margin": (np.uint16, "HW"),
+    "spread": (np.float32, "HW"),
+    "support": (np.float64, "K"),
+    "residual": (np.float64, "K"),
+    "gain": (np.float64, "K"),
+    "saturated": (np.float64, "K"),
+}
+"""The same for `analysis.Confidence`: all are there, or none as in results of 0.1."""
 
 
 def save_result(
@@ -103,8 +115,11 @@ def result_npz(analysis: Analysis) -> bytes:
     }
     if analysis.lights is not None:
         arrays["lights"] = analysis.lights
+    if analysis.confidence is not None:
+        arrays |= vars(analysis.confidence)
     buffer = io.BytesIO()
-    typed = {name: np.asarray(value, ARRAYS[name][0]) for name, value in arrays.items()}
+    kinds = ARRAYS | CONFIDENCE
+    typed = {name: np.asarray(value, kinds[name][0]) for name, value in arrays.items()}
     np.savez_compressed(buffer, allow_pickle=False, **typed)
     return buffer.getvalue()
 
@@ -128,6 +143,7 @@ def load_result(path: str | Path) -> Analysis:
         names = tuple(image["name"] for image in report["images"])
         if len(names) != len(arrays["labels"]) or "total" not in report["seconds"]:
             raise foreign(file.with_name(REPORT))
+        known = {name: arrays[name] for name in CONFIDENCE if name in arrays}
         return Analysis(
             options=Options(**options),
             thresholds=Thresholds(float(arrays["T"]), float(arrays["Ts"])),
@@ -139,6 +155,7 @@ def load_result(path: str | Path) -> Analysis:
             names=names,
             seconds={stage: float(s) for stage, s in report["seconds"].items()},
             title=report["title"],
+            confidence=Confidence(**known) if known else None,
             lights=arrays.get("lights"),
             files=tuple((entry["path"], entry["sha256"]) for entry in report["files"]),
             notes=tuple(report["notes"]),
@@ -195,17 +212,20 @@ def _result_file(path: str | Path) -> Path:
 
 
 def _read_arrays(file: Path) -> Mapping[str, NDArray]:
-    """The arrays of result.npz, each of the type and shape ARRAYS says."""
+    """The arrays of result.npz, each of the type and shape ARRAYS and CONFIDENCE say."""
+    kinds = ARRAYS | CONFIDENCE
     try:
         with np.load(io.BytesIO(read_bytes(file)), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in ARRAYS if name in archive}
+            arrays = {name: archive[name] for name in kinds if name in archive}
     except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise foreign(file) from error
     if not set(ARRAYS) - {"lights"} <= set(arrays):
         raise foreign(file)
+    if set(CONFIDENCE) & set(arrays) not in (set(), set(CONFIDENCE)):
+        raise foreign(file)
     sizes = {"3": 3}
     for name, array in arrays.items():
-        dtype, axes = ARRAYS[name]
+        dtype, axes = kinds[name]
         if array.dtype != dtype or array.ndim != len(axes):
             raise foreign(file)
         for axis, size in zip(axes, array.shape, strict=True):
