@@ -7,7 +7,8 @@ reports through the same worker.
 """
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from threading import Event, Thread
@@ -40,6 +41,9 @@ REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
 FIRST = Thresholds(0.05, 0.02)
 """Where the sliders stand until thresholds are given or suggested."""
+
+EMPTY = "linearize again starts anew"
+"""What follows from cancelling the first run."""
 
 
 class Session:
@@ -180,7 +184,8 @@ class Session:
         if thresholds is not None:
             options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
         self._declined = frozenset((*self._declined, method))
-        result = self._runs.run(options, self._run.progress, self._job.stopping)
+        with cancelling("linearization", "the earlier result is kept" if self._results else EMPTY):
+            result = self._runs.run(options, self._run.progress, self._job.stopping)
         self._declined = frozenset(m for m in self._declined if m != method)
         untouched = not self._results and self._read().thresholds == self._first
         self._results = {**self._results, method: result}
@@ -188,7 +193,9 @@ class Session:
             self._thresholds.set(result.thresholds)
 
     def _set_suggested(self) -> None:
-        self._thresholds.set(self._runs.suggest(self._run.progress, self._job.stopping))
+        with cancelling("suggestion", "T and Ts are kept"):
+            suggested = self._runs.suggest(self._run.progress, self._job.stopping)
+        self._thresholds.set(suggested)
 
     def _send(self, state: ViewState, kind: str, everything: bool) -> None:
         analysis = self._results.get(state.method)
@@ -253,3 +260,12 @@ class Session:
             return
         traceback.print_exception(error)
         self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")
+
+
+@contextmanager
+def cancelling(what: str, then: str) -> Iterator[None]:
+    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
+    try:
+        yield
+    except Cancelled as error:
+        raise Cancelled(f"{what} cancelled; {then}") from error
