@@ -8,6 +8,7 @@ import weakref
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -29,6 +30,7 @@ from websockets.typing import Origin, Subprotocol
 
 from photolin.analysis import Analysis, Cancel, Options, Progress
 from photolin.errors import Cancelled, DegenerateError
+from photolin.export import load_result
 from photolin.factors import LETTERS, PALETTE, TITLES, Factor, Thresholds
 from photolin.label import label_images
 from photolin.pipeline import analyze
@@ -722,7 +724,8 @@ def test_a_first_run_that_is_cancelled_says_how_to_go_on(
 def save(page: Any, session: Session, kind: str, images: str) -> tuple[str, bytes]:
     """Choose and press Download; the file's name and bytes."""
     choose(page, session._export._kind, kind)
-    choose(page, session._export._images, images)
+    if images:
+        choose(page, session._export._images, images)
     with page.expect_download() as started:
         page.get_by_role("button", name="Download", exact=True).click()
     with open(started.value.path(), "rb") as file:
@@ -736,7 +739,7 @@ def unzip(data: bytes) -> list[np.ndarray]:
         ]
 
 
-def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App) -> None:
+def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App, tmp_path: Path) -> None:
     session = enter(page, app)
     press(page, "ArrowRight", *"[[[[[[[[")
     wait_until(lambda: session._read().T < 0.025)
@@ -763,11 +766,18 @@ def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App) -> None:
     assert np.array_equal(pixels, RESULT.linearized(1), equal_nan=True)
     assert np.nanmin(pixels) < 0
 
-    name, data = save(page, session, "everything (result.npz)", "all images")
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        assert np.array_equal(arrays["labels"], labels)
-        assert np.array_equal(arrays["linearized_bases"], RESULT.linearized_bases, equal_nan=True)
-        assert (arrays["T"], arrays["Ts"]) == (state.T, state.Ts)
+    name, data = save(page, session, "result (npz and json, zip)", "")
+    assert name == "sphere_cone_result.zip"
+    assert widget(page, session._export._images).is_disabled()
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path)
+    opened = load_result(tmp_path)
+    assert np.array_equal(opened.labels, labels)
+    assert np.array_equal(opened.linearized_bases, RESULT.linearized_bases, equal_nan=True)
+    assert opened.thresholds == state.thresholds
+
+    choose(page, session._export._kind, "masks (PNG, zip)")
+    wait_until(lambda: widget(page, session._export._images).is_enabled())
 
 
 # --- what goes wrong ---

@@ -21,7 +21,7 @@ from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import LETTERS, Thresholds
 
 from .canvas import Canvas, Pixel
-from .downloads import make_download, relabel
+from .downloads import Pack, make_download, relabel
 from .frame import Frame, compose
 from .job import Job
 from .painter import Painter
@@ -49,9 +49,9 @@ EMPTY = "linearize again starts anew"
 class Session:
     """The widgets, the state and the worker of one tab."""
 
-    def __init__(self, client: viser.ClientHandle, runs: Runs) -> None:
+    def __init__(self, client: viser.ClientHandle, runs: Runs, pack: Pack) -> None:
         """Build the tab and start to work for it."""
-        self._client, self._runs, self._stack = client, runs, runs.stack
+        self._client, self._runs, self._stack, self._pack = client, runs, runs.stack, pack
         self._results: dict[Method, Analysis] = {}
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
@@ -203,7 +203,7 @@ class Session:
             raise OptionError("there is no result to export yet; linearize first")
         self._run.progress("writing files", 0.5)
         shown = relabel(self._stack, analysis, state.thresholds)
-        name, data = make_download(shown, kind, None if everything else state.image)
+        name, data = make_download(shown, kind, None if everything else state.image, self._pack)
         # viser's page itself tells the name and the size
         self._client.send_file_download(name, data, save_immediately=True)
 
