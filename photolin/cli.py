@@ -37,8 +37,10 @@ from .export import (
     export_files,
     is_result,
     load_result,
+    load_result_source,
     load_result_stack,
     program_version,
+    result_files,
     save_result,
     write_files,
 )
@@ -141,10 +143,21 @@ def inspect(
             images, _ = _load(path, reading, progress)
         else:
             images = load_result_stack(path, stack)
+            was, reading = load_result_source(path)
+            path = stack or was or path
     from webapp.app import serve
 
-    options = result.options if result else analysis
-    serve(images, result, options=options, host=host, port=port, open_browser=not no_browser)
+    serve(
+        images,
+        result,
+        options=result.options if result else analysis,
+        pack=functools.partial(
+            result_files, command=COMMAND.get(), stack_path=path, load_options=reading
+        ),
+        host=host,
+        port=port,
+        open_browser=not no_browser,
+    )
 
 
 @verb

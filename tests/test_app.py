@@ -8,6 +8,7 @@ import weakref
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -29,7 +30,8 @@ from websockets.typing import Origin, Subprotocol
 
 from photolin.analysis import Analysis, Cancel, Options, Progress
 from photolin.errors import Cancelled, DegenerateError
-from photolin.factors import LETTERS, PALETTE, Factor, Thresholds
+from photolin.export import load_result
+from photolin.factors import LETTERS, PALETTE, TITLES, Factor, Thresholds
 from photolin.label import label_images
 from photolin.pipeline import analyze
 from photolin.stack import ImageStack
@@ -427,6 +429,97 @@ def test_what_is_used_together_is_seen_together_in_a_small_window(page: Any, app
     assert 0 < box["y"] < 720 - box["height"]
 
 
+def test_the_scroll_bar_covers_no_widget(page: Any, app: App) -> None:
+    session = enter(page, app)
+    page.set_viewport_size({"width": 1280, "height": 720})
+    bar = page.locator(".mantine-ScrollArea-scrollbar[data-orientation=vertical]")
+    bar = bar.filter(visible=True)
+    bar.wait_for()
+    left = bar.bounding_box()["x"]
+    for handle in (session._picture._layer, session._run._method, session._pixel_view._beside):
+        box = widget(page, handle).bounding_box()
+        assert box["x"] + box["width"] <= left
+
+
+# --- keys ---
+
+
+def test_keys_reach_the_picture_after_any_use_of_the_pointer(page: Any, app: App) -> None:
+    session = enter(page, app)
+    page.set_viewport_size({"width": 1280, "height": 900})
+    view, legend_view = session._picture, session._legend
+
+    def use_switch() -> None:
+        widget(page, legend_view._switches[Factor.UNDEFINED]).click()
+
+    for count, use in enumerate(
+        (
+            lambda: page.get_by_role("tab", name="Tune").click(),
+            lambda: page.get_by_role("button", name="fit").click(),
+            lambda: choose(page, view._layer, "labels"),
+            use_switch,
+            use_switch,
+            lambda: thumb(page, legend_view._opacity).click(),
+            lambda: click_pixel(page, 30, 20),
+        ),
+        1,
+    ):
+        use()
+        page.wait_for_timeout(100)
+        press(page, "ArrowRight")
+        wait_until(lambda count=count: view._image.value == count)
+    wait_for_part(page, painted(RESULT.labels[7]), away_from(30))
+    page.get_by_role("tab", name="Tune").click()
+    page.keyboard.down(" ")
+    wait_for_part(page, np.repeat(picture(7)[..., None], 3, axis=2), away_from(30))
+    page.keyboard.up(" ")
+    wait_for_part(page, painted(RESULT.labels[7]), away_from(30))
+
+
+def test_a_list_has_the_keys_while_it_is_open_and_the_picture_afterwards(
+    page: Any, app: App
+) -> None:
+    session = enter(page, app)
+    layer, image = session._picture._layer, session._picture._image
+    for end in ("Enter", "Escape"):
+        before = image.value
+        widget(page, layer).click()
+        option = page.get_by_role("option", name="residual", exact=True)
+        option.wait_for()
+        press(page, "m", "ArrowRight")  # typed into the list's own search
+        assert session._read().method == "robust"
+        assert image.value == before
+        press(page, "Backspace", "ArrowDown", end)
+        option.wait_for(state="hidden")
+        chosen = layer.value
+        press(page, "ArrowUp")
+        wait_until(lambda: layer.value != chosen)  # noqa: B023
+        assert not option.is_visible()
+        press(page, "ArrowRight")
+        wait_until(lambda: image.value == before + 1)  # noqa: B023
+
+
+def test_a_number_being_typed_has_its_keys_and_tab_goes_from_widget_to_widget(
+    page: Any, app: App
+) -> None:
+    session = enter(page, app)
+    T = session._thresholds._T
+    field = widget(page, T).locator("xpath=..").locator("input:not([type=hidden])")
+    field.click()
+    press(page, "Home", "ArrowRight", "1")
+    page.wait_for_timeout(200)
+    assert session._picture._image.value == 0
+    assert session._read().shown == frozenset(Factor)
+    field.fill("0.03")
+    wait_until(lambda: T.value == 0.03)
+    thumb(page, T).focus()
+    press(page, "Tab", "Tab")
+    assert thumb(page, session._thresholds._Ts).evaluate("e => e === document.activeElement")
+    press(page, "ArrowRight")  # reached by keyboard, the slider has its arrows
+    wait_until(lambda: session._thresholds._Ts.value > 0.02)
+    assert session._picture._image.value == 0
+
+
 # --- tabs ---
 
 
@@ -533,11 +626,11 @@ def test_linearizing_again_can_be_cancelled_and_says_what_the_bases_belong_to(
     page: Any, open_app: OpenApp, gate: Gate
 ) -> None:
     session = enter(page, open_app(result=RESULT))
-    wait_for_text(page, "Labels and linearized bases: T 0.050, Ts 0.020.")
+    wait_for_text(page, "Labels and linearized bases: T 0.0500, Ts 0.0200.")
     press(page, *"]" * 8)
     wait_until(lambda: session._read().T > 0.09)
     T = session._read().T
-    wait_for_text(page, f"Labels: T {T:.3f}, Ts 0.020. Linearized bases: T 0.050, Ts 0.020;")
+    wait_for_text(page, f"Labels: T {T:.4f}, Ts 0.0200. Linearized bases: T 0.0500, Ts 0.0200;")
 
     page.get_by_role("button", name="linearize again").click()
     wait_until(lambda: len(gate.began) == 1)
@@ -545,14 +638,15 @@ def test_linearizing_again_can_be_cancelled_and_says_what_the_bases_belong_to(
     wait_for_text(page, "Still running")
     press(page, "e", "s")
     page.get_by_role("button", name="Cancel").click()
-    wait_for_text(page, "coefficients was cancelled")
+    wait_for_text(page, "linearization cancelled; the earlier result is kept")
+    assert page.get_by_text("coefficients was cancelled").count() == 0
     assert session._results == {"robust": RESULT}
     wait_for_colours(page, blended(picture(0), labels_at(session)), tolerance=1)
 
     gate.release.set()
     leave_widgets(page)
     press(page, "r")
-    wait_for_text(page, f"Labels and linearized bases: T {T:.3f}, Ts 0.020.")
+    wait_for_text(page, f"Labels and linearized bases: T {T:.4f}, Ts 0.0200.")
     expected = replace(OPTIONS, T=T, Ts=0.02)
     assert gate.began == [expected, expected]
     result = analyze(STACK, expected)
@@ -588,13 +682,50 @@ def test_methods_are_computed_once_and_kept_even_if_asked_for_while_one_runs(
     assert len(gate.began) == 2
 
 
+def test_two_methods_are_compared_in_percentages_plots_and_sentences(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app(result=RESULT))
+    choose(page, session._pixel_view._beside, "statistical")
+    wait_for_text(page, "Click a pixel to see why robust and statistical label it as they do.")
+    wait_until(lambda: "statistical" in session._results)
+    other = session._results["statistical"]
+    here, there = labels_at(session), labels_at(session, other)
+    differing = np.argwhere((here != there) & STACK.mask)
+    assert len(differing)
+    row, column = map(int, differing[len(differing) // 2])
+    click_pixel(page, row, column)
+    wait_for_text(page, "robust, image 0: i ")
+    panel = " ".join(page.inner_text("body").split())
+    for shown in (here, there):
+        assert " ".join(shares(shown)) in panel
+        assert panel.count(" ".join(shares(shown))) == 1
+    first, second = panel.split("robust, image 0: i ")[1].split("statistical, image 0: i ")
+    for sentence, shown in ((first, here), (second, there)):
+        assert f": {TITLES[Factor(int(shown[row, column]))]}" in sentence.split("Pixel (")[0]
+
+
+def test_a_first_run_that_is_cancelled_says_how_to_go_on(
+    page: Any, open_app: OpenApp, gate: Gate
+) -> None:
+    session = enter(page, open_app())
+    wait_until(lambda: len(gate.began) == 1)
+    press(page, "Escape")
+    wait_for_text(page, "linearization cancelled; linearize again starts anew")
+    assert session._results == {}
+    gate.release.set()
+    page.get_by_role("button", name="linearize again").click()
+    wait_until(lambda: "robust" in session._results)
+
+
 # --- exports ---
 
 
 def save(page: Any, session: Session, kind: str, images: str) -> tuple[str, bytes]:
     """Choose and press Download; the file's name and bytes."""
     choose(page, session._export._kind, kind)
-    choose(page, session._export._images, images)
+    if images:
+        choose(page, session._export._images, images)
     with page.expect_download() as started:
         page.get_by_role("button", name="Download", exact=True).click()
     with open(started.value.path(), "rb") as file:
@@ -608,7 +739,7 @@ def unzip(data: bytes) -> list[np.ndarray]:
         ]
 
 
-def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App) -> None:
+def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App, tmp_path: Path) -> None:
     session = enter(page, app)
     press(page, "ArrowRight", *"[[[[[[[[")
     wait_until(lambda: session._read().T < 0.025)
@@ -635,11 +766,18 @@ def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App) -> None:
     assert np.array_equal(pixels, RESULT.linearized(1), equal_nan=True)
     assert np.nanmin(pixels) < 0
 
-    name, data = save(page, session, "everything (result.npz)", "all images")
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        assert np.array_equal(arrays["labels"], labels)
-        assert np.array_equal(arrays["linearized_bases"], RESULT.linearized_bases, equal_nan=True)
-        assert (arrays["T"], arrays["Ts"]) == (state.T, state.Ts)
+    name, data = save(page, session, "result (npz and json, zip)", "")
+    assert name == "sphere_cone_result.zip"
+    assert widget(page, session._export._images).is_disabled()
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path)
+    opened = load_result(tmp_path)
+    assert np.array_equal(opened.labels, labels)
+    assert np.array_equal(opened.linearized_bases, RESULT.linearized_bases, equal_nan=True)
+    assert opened.thresholds == state.thresholds
+
+    choose(page, session._export._kind, "masks (PNG, zip)")
+    wait_until(lambda: widget(page, session._export._images).is_enabled())
 
 
 # --- what goes wrong ---

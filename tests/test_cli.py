@@ -115,6 +115,28 @@ def test_a_result_finds_its_stack_again(stack: Path, tmp_path: Path, monkeypatch
     assert {digest for _, digest in found.files} == {d for _, d in load_result(tmp_path).files}
 
 
+def test_what_inspect_lets_download_finds_its_stack_again(
+    stack: Path, tmp_path: Path, monkeypatch
+) -> None:
+    served: list[dict] = []
+    monkeypatch.setattr("webapp.app.serve", lambda *of, **how: served.append(how | {"of": of}))
+    moved = tmp_path / "moved"
+    shutil.copytree(stack, moved)
+    roi = ["--roi", "4", "40", "8", "56"]
+    assert main(["run", str(stack), str(tmp_path / "out"), "--T", "0.02", *roi]) == 0
+    result = load_result(tmp_path / "out")
+    for arguments, place in (
+        ([stack, *roi], stack),
+        ([tmp_path / "out"], stack),
+        ([tmp_path / "out", "--stack", moved], moved),
+    ):
+        assert main(["inspect", *map(str, arguments)]) == 0
+        report = json.loads(served[-1]["pack"](result)["report.json"])
+        assert report["stack"] == str(place)
+        assert report["load"]["roi"] == [4, 40, 8, 56]
+        assert served[-1]["of"][0].images.shape == (8, 36, 48)
+
+
 def test_a_result_refuses_images_that_changed(stack: Path, tmp_path: Path, capsys) -> None:
     assert main(["synth", "sphere_cone", str(tmp_path / "a"), "--size", "32", "32"]) == 0
     assert main(["run", str(tmp_path / "a"), str(tmp_path / "out"), "--T", "0.02"]) == 0
@@ -140,7 +162,7 @@ def test_export_writes_what_was_asked(result: Path, tmp_path: Path) -> None:
     one = ["export", str(result), str(tmp_path / "one"), "--what", "labels", "linearized"]
     assert main([*one, "--image", "3"]) == 0
     names = sorted(p.name for p in (tmp_path / "one").iterdir())
-    assert names == ["labels_003_003.png", "linearized_003_003.tif"]
+    assert names == ["labels_003.png", "linearized_003.tif"]
     analysis = load_result(result)
     page = tifffile.imread(tmp_path / "one" / names[1])
     with Image.open(tmp_path / "one" / names[0]) as image:

@@ -3,6 +3,8 @@
 import io
 import zipfile
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +13,12 @@ from PIL import Image
 
 from photolin.analysis import Options
 from photolin.errors import OptionError
+from photolin.export import is_result, load_result, load_result_stack, result_files
 from photolin.factors import LETTERS, OUTSIDE, Thresholds
 from photolin.label import label_images
+from photolin.load import LoadOptions, load_stack
 from photolin.pipeline import analyze
-from photolin.synthetic import render_scene
+from photolin.synthetic import render_scene, write_scene
 from webapp.downloads import make_download, relabel
 
 FULL = render_scene("sphere_cone", size=(20, 30), images=7).stack
@@ -81,19 +85,36 @@ def test_linearized_images_keep_their_sign_and_bits(image: int | None) -> None:
     assert np.nanmin(pages) < -0.01
 
 
-def test_the_archive_holds_the_result_as_shown() -> None:
+def test_a_downloaded_result_opens_again_as_shown(tmp_path: Path) -> None:
     name, data = make_download(SHOWN, "result", 3)
-    assert name == "sphere_cone_result.npz"
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        for field in ("labels", "linearized_bases", "coefficients", "mask"):
-            assert np.array_equal(arrays[field], getattr(SHOWN, field), equal_nan=True), field
-        assert (arrays["T"], arrays["Ts"]) == (SCREEN.T, SCREEN.Ts)
+    assert name == "sphere_cone_result.zip"
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.json", "result.npz"]
+    opened = load_result(tmp_path)
+    assert is_result(tmp_path)
+    for field in ("labels", "linearized_bases", "coefficients", "mask"):
+        assert np.array_equal(getattr(opened, field), getattr(SHOWN, field), equal_nan=True), field
+    assert (opened.thresholds, opened.options) == (SCREEN, RESULT.options)
+    assert opened.notes == SHOWN.notes
 
 
-def test_names_are_safe_on_any_file_system() -> None:
-    hostile = replace(SHOWN, title="../a:b*c é")
-    name, _ = make_download(hostile, "result", None)
-    assert name == "___a_b_c_é_result.npz"
+def test_a_downloaded_result_finds_its_images_as_they_were_read(tmp_path: Path) -> None:
+    write_scene(render_scene("sphere_cone", size=(20, 30), images=7), tmp_path / "scene")
+    reading = LoadOptions(roi=(2, 18, 3, 29))
+    stack = load_stack(tmp_path / "scene", reading)
+    result = analyze(stack, Options(T=0.05, Ts=0.02, samples=50))
+    pack = partial(result_files, stack_path=tmp_path / "scene", load_options=reading)
+    _, data = make_download(result, "result", None, pack)
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path / "out")
+    found = load_result_stack(tmp_path / "out")
+    assert np.array_equal(found.images, stack.images)
+
+
+@pytest.mark.parametrize(("title", "stem"), [("../a:b*c é", "_a_b_c é"), ("..", "stack")])
+def test_names_are_safe_on_any_file_system(title: str, stem: str) -> None:
+    assert make_download(replace(SHOWN, title=title), "labels", 2)[0] == f"{stem}_002_labels.zip"
 
 
 def test_outside_the_mask_is_in_no_mask() -> None:

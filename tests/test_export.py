@@ -21,14 +21,18 @@ from photolin.export import (
     label_png,
     linearized_tiff,
     load_result,
+    load_result_source,
     load_result_stack,
     mask_png,
+    result_files,
     result_npz,
+    safe_name,
     save_result,
     write_files,
     zip_files,
 )
 from photolin.factors import OUTSIDE, PALETTE, Factor, Thresholds, classify
+from photolin.load import LoadOptions
 
 K, H, W = 7, 5, 4
 
@@ -228,7 +232,40 @@ def test_exports_of_all_images_have_safe_unique_names(
 ) -> None:
     files = export_files(analysis, contents)
     assert len(files) == count
-    assert all(name.isascii() and not set(name) & set('/\\: "') for name in files)
+    assert not any(set(name) & set('/\\:"') for name in files)
+
+
+def test_names_of_files_keep_the_letters_of_all_alphabets(analysis: Analysis) -> None:
+    names = list(export_files(analysis, "labels", [K - 2, K - 1]))
+    assert names == [f"labels_{K - 2:03d}_Größe 1.png", f"labels_{K - 1:03d}_img 6.png"]
+
+
+@pytest.mark.parametrize(
+    ("name", "safe"),
+    [
+        ("Größe 像 (2) #1.a", "Größe 像 (2) #1.a"),
+        ('a<b>c:d"e/f\\g|h?i*j\0k\x7f', "a_b_c_d_e_f_g_h_i_j_k_"),
+        ("\udcff", "_"),
+        ("..", ""),
+        (". hidden. ", "hidden"),
+        ("o\u0308", "ö"),
+        ("像" * 100, "像" * 40),
+    ],
+)
+def test_a_name_loses_only_what_file_systems_reject(name: str, safe: str, tmp_path: Path) -> None:
+    assert safe_name(name) == safe
+    (tmp_path / f"labels_{safe}.png").write_bytes(b"")
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [("004.png", "004"), ("4.tif", "004"), ("0005.png", "004_0005"), ("a4.png", "004_a4")],
+)
+def test_a_number_that_is_the_name_is_written_once(
+    analysis: Analysis, name: str, written: str
+) -> None:
+    named = replace(analysis, names=(*analysis.names[:4], name, *analysis.names[5:]))
+    assert list(export_files(named, "labels", [4])) == [f"labels_{written}.png"]
 
 
 def test_exports_of_one_image_name_it(analysis: Analysis) -> None:
@@ -460,6 +497,14 @@ def test_a_result_whose_images_moved_names_the_way_out(analysis: Analysis, tmp_p
     save_result(analysis, tmp_path, stack_path=tmp_path / "gone")
     with pytest.raises(InputError, match=r"gone is missing\); name them with --stack"):
         load_result_stack(tmp_path)
+
+
+def test_the_files_of_a_result_are_what_is_saved(analysis: Analysis, tmp_path: Path) -> None:
+    options = LoadOptions(channel="max", roi=(0, 4, 1, 5), mask=tmp_path / "mask.png")
+    save_result(analysis, tmp_path, stack_path=tmp_path / "images", load_options=options)
+    files = result_files(analysis, stack_path=tmp_path / "images", load_options=options)
+    assert files == {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert load_result_source(tmp_path) == (tmp_path / "images", options)
 
 
 def test_partial_files_of_others_are_left_alone(analysis: Analysis, tmp_path: Path) -> None:

@@ -38,6 +38,16 @@ def test_labels_are_the_backends_at_the_thresholds_of_the_view(
     assert (frame.labels[:3] == OUTSIDE).all()
 
 
+def test_a_method_to_compare_with_brings_its_own_labels() -> None:
+    frame = compose(STACK, RESULTS, ViewState(image=3, T=0.05, Ts=0.02, beside="statistical"))
+    assert frame.beside is OTHER
+    assert np.array_equal(frame.beside_labels, OTHER.labels[3])
+    assert np.array_equal(frame.labels, ROBUST.labels[3])
+    assert compose(STACK, RESULTS, ViewState()).beside_labels is None
+    missing = compose(STACK, RESULTS, ViewState(beside="classification"))
+    assert missing.beside_labels is None
+
+
 def test_the_thresholds_of_the_run_give_the_labels_of_the_run() -> None:
     frame = compose(STACK, RESULTS, ViewState(image=3, T=0.05, Ts=0.02))
     assert frame.labels is not None

@@ -81,6 +81,19 @@ def test_both_axes_have_one_scale_right_is_brighter_and_up_is_higher():
     assert side.get("width") == side.get("height")
 
 
+def test_a_dark_side_far_below_zero_makes_the_plot_higher_and_not_wider():
+    deep = panel(l=np.array([0.8, 0.3, -0.7, 0.4, 0.6], np.float32))
+    for panels in ([deep], [deep, deep]):
+        (svg, *_) = panels_of(plot_pixel(panels, THRESHOLDS, 0, NAMES))
+        width, height = (float(square(svg).get(name, "")) for name in ("width", "height"))
+        assert height > 1.5 * width
+        (vertical,) = [e for e in square(svg).iter(f"{SVG}line") if e.get("stroke-dasharray")]
+        assert float(vertical.get("x1", "")) < 0.2 * width  # Ts; zero is to the left of it
+        for x, y, *_ in dots(svg).values():
+            assert 0 <= x <= width
+            assert 0 <= y <= height
+
+
 def test_dots_lie_in_the_region_of_their_class():
     rng = np.random.default_rng(0)
     i = rng.uniform(0, 1, 300).astype(np.float32)
@@ -151,7 +164,7 @@ def test_an_unknown_value_has_no_dot_and_a_wild_one_stays_on_the_border():
     (svg,) = panels_of(plot_pixel([panel(l=l)], THRESHOLDS, 0, NAMES))
     found = dots(svg)
     assert "image 1" not in found
-    side = float(square(svg).get("width", ""))
+    side = float(square(svg).get("height", ""))
     assert found["image 2"][1] == pytest.approx(side)
     assert found["image 4"][1] == pytest.approx(0)
     assert 0 < found["image 0"][1] < side

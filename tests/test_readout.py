@@ -27,39 +27,39 @@ THRESHOLDS = Thresholds(0.05, 0.02)
         (
             0.412,
             0.398,
-            "Image 07: i 0.412, l 0.398 of full scale. i = 0.412 ≥ Ts = 0.020 and "
-            "|i - l| = 0.014 ≤ T·i = 0.021: diffuse.",
+            "Image 07: i 0.412, l 0.398 of full scale. i = 0.4120 ≥ Ts = 0.0200 and "
+            "|i - l| = 0.0140 ≤ T·i = 0.0206: diffuse.",
         ),
         (
             0.812,
             0.398,
-            "Image 07: i 0.812, l 0.398 of full scale. i = 0.812 ≥ Ts = 0.020 and "
-            "i - l = 0.414 > T·i = 0.041 with l ≥ 0: specular "
+            "Image 07: i 0.812, l 0.398 of full scale. i = 0.8120 ≥ Ts = 0.0200 and "
+            "i - l = 0.4140 > T·i = 0.0406 with l ≥ 0: specular "
             "(light is added to what the surface scatters).",
         ),
         (
             0.004,
             -0.231,
-            "Image 07: i 0.004, l -0.231 of full scale. i = 0.004 < Ts = 0.020 and l ≤ 0: "
+            "Image 07: i 0.004, l -0.231 of full scale. i = 0.0040 < Ts = 0.0200 and l ≤ 0: "
             "attached shadow (the surface faces away from the light).",
         ),
         (
             0.004,
             0.231,
-            "Image 07: i 0.004, l 0.231 of full scale. i = 0.004 < Ts = 0.020 and l > 0: "
+            "Image 07: i 0.004, l 0.231 of full scale. i = 0.0040 < Ts = 0.0200 and l > 0: "
             "cast shadow (the surface faces the light; something blocks it).",
         ),
         (
             0.3,
             0.4,
-            "Image 07: i 0.300, l 0.400 of full scale. i = 0.300 ≥ Ts = 0.020 and "
-            "l - i = 0.100 > T·i = 0.015: undefined (lit, but below the fit; light can be "
+            "Image 07: i 0.300, l 0.400 of full scale. i = 0.3000 ≥ Ts = 0.0200 and "
+            "l - i = 0.1000 > T·i = 0.0150: undefined (lit, but below the fit; light can be "
             "added to a lit pixel, not taken from it, so l or T is wrong here).",
         ),
         (
             0.3,
             -0.1,
-            "Image 07: i 0.300, l -0.100 of full scale. i = 0.300 ≥ Ts = 0.020 and "
+            "Image 07: i 0.300, l -0.100 of full scale. i = 0.3000 ≥ Ts = 0.0200 and "
             "l = -0.100 < 0: undefined (lit, although the fit says the surface faces away "
             "from the light, so l or Ts is wrong here).",
         ),
@@ -87,7 +87,7 @@ def test_numbers_that_decide_are_never_printed_alike():
 
 
 def test_an_intensity_at_the_shadow_level_is_lit():
-    assert "i = 0.020 ≥ Ts = 0.020 and |i - l| = 0.000" in explain(0.02, 0.02, THRESHOLDS, "a")
+    assert "i = 0.0200 ≥ Ts = 0.0200 and |i - l| = 0.0000" in explain(0.02, 0.02, THRESHOLDS, "a")
 
 
 def test_a_tiny_value_does_not_read_as_zero_and_zero_has_no_sign():
@@ -98,15 +98,17 @@ def test_a_tiny_value_does_not_read_as_zero_and_zero_has_no_sign():
 @pytest.mark.parametrize(
     ("i", "sentence"),
     [
-        ([0.5] * 24, "is lit (i ≥ Ts = 0.020) in 24 of 24 images."),
-        ([0.5] * 3 + [0.0] * 21, "is lit (i ≥ Ts = 0.020) in 3 of 24 images."),
+        ([0.5] * 24, "is lit (i ≥ Ts = 0.0200) in 24 of 24 images."),
+        ([0.5] * 3 + [0.0] * 21, "is lit (i ≥ Ts = 0.0200) in 3 of 24 images."),
         (
             [0.5] * 2 + [0.0] * 22,
-            "is lit (i ≥ Ts = 0.020) in 2 of 24 images: its linearized value cannot be determined.",
+            "is lit (i ≥ Ts = 0.0200) in 2 of 24 images: "
+            "its linearized value cannot be determined.",
         ),
         (
             [0.0] * 24,
-            "is lit (i ≥ Ts = 0.020) in 0 of 24 images: its linearized value cannot be determined.",
+            "is lit (i ≥ Ts = 0.0200) in 0 of 24 images: "
+            "its linearized value cannot be determined.",
         ),
     ],
 )
@@ -150,17 +152,22 @@ def test_the_status_says_whether_the_bases_belong_to_the_thresholds_shown():
     assert threshold_status(THRESHOLDS, None) == "Nothing is linearized yet."
     assert (
         threshold_status(THRESHOLDS, Thresholds(0.05, 0.02))
-        == "Labels and linearized bases: T 0.050, Ts 0.020."
+        == "Labels and linearized bases: T 0.0500, Ts 0.0200."
     )
     assert threshold_status(Thresholds(0.06, 0.02), THRESHOLDS) == (
-        "Labels: T 0.060, Ts 0.020. Linearized bases: T 0.050, Ts 0.020; "
-        "run again to compute them with the present thresholds."
+        "Labels: T 0.0600, Ts 0.0200. Linearized bases: T 0.0500, Ts 0.0200; "
+        "linearize again to match."
     )
 
 
 def test_a_small_difference_of_thresholds_is_visible():
     text = threshold_status(Thresholds(0.05, 0.02), Thresholds(0.05004, 0.02))
-    assert text.startswith("Labels: T 0.05000, Ts 0.020. Linearized bases: T 0.05004, Ts 0.020;")
+    assert text.startswith("Labels: T 0.05000, Ts 0.0200. Linearized bases: T 0.05004, Ts 0.0200;")
+
+
+@pytest.mark.parametrize(("Ts", "said"), [(0.0035, "0.0035"), (0, "0.0000"), (1e-6, "1.0e-06")])
+def test_thresholds_read_as_the_sliders_show_them(Ts, said):
+    assert f"(i ≥ Ts = {said})" in describe_pixel(0, 0, np.ones(6, np.float32), Thresholds(0.1, Ts))
 
 
 def test_a_run_is_one_sentence():
@@ -176,8 +183,8 @@ def test_a_run_is_one_sentence():
         seconds=MappingProxyType({"total": 0.534}),
     )
     assert summarize(analysis) == (
-        "robust: 6 images of 5 x 4, 20 pixels in the mask, base images b, d, f, "
-        "T 0.050, Ts 0.020, 0.53 s."
+        "robust: 6 images of 4 rows × 5 columns, 20 pixels in the mask, base images b, d, f, "
+        "T 0.0500, Ts 0.0200, 0.53 s."
     )
 
 

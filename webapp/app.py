@@ -7,9 +7,11 @@ from threading import Lock
 import viser
 
 from photolin.analysis import Analysis, Options
+from photolin.export import result_files
 from photolin.stack import ImageStack
 
 from .access import Server, open_server
+from .downloads import Pack
 from .runs import Runs
 from .session import Session
 
@@ -23,15 +25,19 @@ class App:
         result: Analysis | None = None,
         *,
         options: Options | None = None,
+        pack: Pack = result_files,
         host: str = "127.0.0.1",
         port: int = 8080,
     ) -> None:
         """Start serving; `result` is shown at once, otherwise the first tab computes by `options`.
 
+        `pack` gives the files of a result that a tab downloads.
+
         Raises:
             OptionError: the host or port cannot be used.
         """
         self._runs = Runs(stack, options or Options(), result)
+        self._pack = pack
         self._sessions: dict[int, Session] = {}
         self._lock = Lock()
         self.server: Server = open_server(host, port)
@@ -48,7 +54,7 @@ class App:
         self.server.stop()
 
     def _attach(self, client: viser.ClientHandle) -> None:
-        session = Session(client, self._runs)
+        session = Session(client, self._runs, self._pack)
         with self._lock:
             self._sessions[client.client_id] = session
         if client.client_id not in self.server.server.get_clients():  # left while it was built
@@ -66,6 +72,7 @@ def serve(
     result: Analysis | None,
     *,
     options: Options,
+    pack: Pack,
     host: str,
     port: int,
     open_browser: bool,
@@ -77,7 +84,7 @@ def serve(
     """
     # a tab may close while its worker draws; viser warns of every such message
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
-    app = App(stack, result, options=options, host=host, port=port)
+    app = App(stack, result, options=options, pack=pack, host=host, port=port)
     print(f"photolin: {stack.title} at {app.server.url} (Ctrl-C ends it)", flush=True)
     try:
         if open_browser:

@@ -237,13 +237,27 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     pressed = null;
   }
 
+  const isList = (widget) => widget.getAttribute?.("role") === "combobox";
+
+  /** Whether a text or number is being typed there, or something chosen from an open list. */
+  function isBusy(widget) {
+    if (isList(widget)) return widget.getAttribute("aria-expanded") === "true";
+    const kind = widget.tagName === "INPUT" ? widget.type : widget.tagName;
+    return widget.isContentEditable || /^(TEXTAREA|SELECT|text|number|search)$/.test(kind);
+  }
+
   /** Whether the focused widget uses this key itself. */
   function isForWidget({ key, target }) {
-    const kind = target.tagName === "INPUT" ? target.type : target.tagName;
-    if (target.isContentEditable || /^(TEXTAREA|SELECT|text|number|search)$/.test(kind)) return true;
+    if (isBusy(target)) return true;
     if (target === document.body || target === canvas) return false;
-    const movable = /^(slider|tab|radio|option|listbox)$/.test(target.getAttribute?.("role") ?? kind);
+    const movable = /^(slider|tab|radio)$/.test(target.getAttribute?.("role") ?? target.type);
     return key === " " || key === "Enter" || key === "Tab" || (movable && key.startsWith("Arrow"));
+  }
+
+  /** Whoever works with the pointer, or has chosen from a list, has the keys for the picture. */
+  function giveFocusBack() {
+    const focused = document.activeElement;
+    if (focused && !isBusy(focused)) focused.blur(); // Tab still goes on from there
   }
 
   const local = { f: fit, g: oneToOne, " ": () => peek(true) };
@@ -256,12 +270,15 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   function onKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
     const action = local[event.key.toLowerCase()];
-    if (action) {
-      event.preventDefault();
-      if (!event.repeat && placed()) action();
-    } else if (event.key.length === 1 || event.key.startsWith("Arrow") || event.key === "Escape") {
-      report(keyId, event.key);
+    const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
+    if (!action && !reported) return;
+    if (isList(event.target)) {
+      event.stopPropagation(); // it would open again
+      giveFocusBack();
     }
+    if (!action) return report(keyId, event.key);
+    event.preventDefault();
+    if (!event.repeat && placed()) action();
   }
 
   listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
@@ -271,6 +288,8 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   });
   listen(canvas, "pointerup", release);
   listen(canvas, "dblclick", () => placed() && fit());
+  // After the widget has had the click; those made with the keyboard have no detail.
+  listen(window, "click", ({ detail }) => detail > 0 && setTimeout(giveFocusBack), true);
   listen(window, "keydown", onKey, true);
   listen(window, "keyup", (event) => event.key === " " && peeking && peek(false), true);
   listen(window, "blur", () => peeking && peek(false));
@@ -281,6 +300,10 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   });
 
   // --- settings of the page ---
+
+  // The panel's scroll bar lies over the right end of its boxes and buttons.
+  const style = document.head.appendChild(document.createElement("style"));
+  style.textContent = ".mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}";
 
   // viser lowers the resolution on slow machines, which blurs pixels.
   const fixResolution = () =>
@@ -311,6 +334,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     closing.abort();
     clearTimeout(hoverTimer);
     layer.remove();
+    style.remove();
     scene.onBeforeRender = () => {};
   }
 

@@ -1,13 +1,17 @@
 """Files for the browser to save: what is on screen, by the thresholds on screen. Pure."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from photolin.analysis import Analysis
 from photolin.errors import OptionError
-from photolin.export import export_files, result_npz, zip_files
+from photolin.export import export_files, result_files, safe_name, zip_files
 from photolin.factors import Thresholds
 from photolin.label import label_images
 from photolin.stack import ImageStack
+
+Pack = Callable[[Analysis], Mapping[str, bytes]]
+"""Gives the files of a result, name to bytes, as `result_files` does."""
 
 
 def relabel(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> Analysis:
@@ -28,23 +32,26 @@ def relabel(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> An
     return replace(analysis, labels=labels, thresholds=thresholds, notes=(*analysis.notes, note))
 
 
-def make_download(analysis: Analysis, kind: str, image: int | None) -> tuple[str, bytes]:
+def make_download(
+    analysis: Analysis, kind: str, image: int | None, pack: Pack = result_files
+) -> tuple[str, bytes]:
     """Name and bytes of one download.
 
     Args:
         analysis: labelled by the thresholds on screen.
         kind: masks, labels, linearized or result.
         image: image number from 0; None for all (result always holds all).
+        pack: gives the files of a result.
 
     Raises:
         OptionError: no such kind.
     """
-    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in analysis.title)
+    stem = safe_name(analysis.title) or "stack"
     which = "all" if image is None else f"{image:03d}"
     images = None if image is None else [image]
     match kind:
         case "result":
-            return f"{stem}_result.npz", result_npz(analysis)
+            return f"{stem}_result.zip", zip_files(pack(analysis))
         case "linearized":
             (data,) = export_files(analysis, "linearized", images).values()
             return f"{stem}_{which}_linearized.tif", data

@@ -26,6 +26,8 @@ class Frame:
     """Result of the method compared with; None where none is wanted or there yet."""
     labels: NDArray[np.uint8] | None
     """(H,W) of the image shown, by the view's thresholds."""
+    beside_labels: NDArray[np.uint8] | None
+    """The same by the method compared with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +45,23 @@ class PixelValues:
 def compose(stack: ImageStack, results: Mapping[Method, Analysis], state: ViewState) -> Frame:
     """The frame of a view."""
     analysis = results.get(state.method)
-    labels = None
-    if analysis is not None:
-        k = state.image
-        one = slice(k, k + 1)
-        labels = label_images(
-            stack.images[one],
-            analysis.linearized_bases,
-            analysis.coefficients[one],
-            stack.mask,
-            state.thresholds,
-        )[0]
     beside = results.get(state.beside) if state.beside is not None else None
-    return Frame(stack, state, analysis, beside, labels)
+    labels, beside_labels = (
+        None if a is None else _label(stack, a, state) for a in (analysis, beside)
+    )
+    return Frame(stack, state, analysis, beside, labels, beside_labels)
+
+
+def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:
+    """(H,W): labels of the image shown by one result and the view's thresholds."""
+    one = slice(state.image, state.image + 1)
+    return label_images(
+        stack.images[one],
+        analysis.linearized_bases,
+        analysis.coefficients[one],
+        stack.mask,
+        state.thresholds,
+    )[0]
 
 
 def pixel_values(

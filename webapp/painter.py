@@ -19,6 +19,9 @@ from .render import (
 LARGE = 400_000
 """Pixels above which a picture is first sent as JPEG, and without loss once nothing changes."""
 
+HIDDEN = "; labels hidden here, outlines show them"
+"""End of the caption of a picture without its labels."""
+
 
 class Painter:
     """Picture, overlay, marker and readout of one tab."""
@@ -26,7 +29,7 @@ class Painter:
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
         self._drawn: dict[str, object] = {}
-        self._caption = ""
+        self._legend = ""
         self._rough = False
 
     def paint(self, frame: Frame, pointer: Pixel | None, *, rested: bool) -> bool:
@@ -43,7 +46,7 @@ class Painter:
         look = (state.image, state.layer, state.gain, frame.analysis)
         exact = frame.stack.mask.size <= LARGE or rested
         if self._is_new("picture", *look) or (exact and self._rough):
-            picture, self._caption = render_layer(frame)
+            picture, self._legend = render_layer(frame)
             if exact:
                 self._canvas.set_base(encode_png(picture), "png")
             else:
@@ -52,17 +55,19 @@ class Painter:
         self._paint_overlay(frame)
         if self._is_new("marker", state.pixel):
             self._canvas.set_marker(state.pixel)
-        self._canvas.set_readout(self._caption if pointer is None else describe(frame, pointer))
+        caption = self._legend + (HIDDEN if hides_labels(frame) else "")
+        self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
         return self._rough
 
     def _paint_overlay(self, frame: Frame) -> None:
         state = frame.state
         solid = state.layer == "labels"
-        look = (state.shown, state.opacity, state.outlines, solid)
+        hidden = hides_labels(frame)
+        look = (state.shown, state.opacity, state.outlines, solid, hidden)
         if not self._is_new("overlay", state.image, state.thresholds, frame.analysis, look):
             return
         overlay = None
-        if frame.labels is not None:
+        if frame.labels is not None and not hidden:
             overlay = encode_labels(
                 frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
             )
@@ -73,6 +78,16 @@ class Painter:
             return False
         self._drawn[part] = key
         return True
+
+
+def hides_labels(frame: Frame) -> bool:
+    """Whether labels are left out because they would hide the signed picture's own colours.
+
+    Outlines leave enough of it to be seen.
+    """
+    state = frame.state
+    signed = state.layer in ("linearized", "residual")
+    return signed and frame.labels is not None and not state.outlines
 
 
 def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:

@@ -17,7 +17,9 @@ from .readout import escape
 Point = tuple[float, float]
 
 LEFT, TOP, RIGHT, BOTTOM = 40, 22, 16, 36
-"""Margins around the square, in the units of the drawing (pixels at its natural size)."""
+"""Margins around the plot, in the units of the drawing (pixels at its natural size)."""
+BELOW = 0.1
+"""How far the axes go below zero at least, of how far they go above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +38,25 @@ class PixelPanel:
 
 @dataclass(frozen=True)
 class _Axes:
-    """One range for both axes, and the side of the square it fills."""
+    """One scale for both axes: i from `left`, l from `low`, both to `high`.
 
+    A square, unless l goes farther below zero than i, which is never negative.
+    """
+
+    left: float
     low: float
     high: float
-    side: int
+    unit: float
+    """Drawing units for 1 of full scale."""
+
+    @property
+    def size(self) -> Point:
+        """(width, height) of the plot, drawing units."""
+        return self.at(self.high, self.low)
 
     def at(self, i: float, l: float) -> Point:
-        """Drawing coordinates of (i, l) from the square's upper left corner."""
-        unit = self.side / (self.high - self.low)
-        return round((i - self.low) * unit, 2), round((self.high - l) * unit, 2)
+        """Drawing coordinates of (i, l) from the plot's upper left corner."""
+        return round((i - self.left) * self.unit, 2), round((self.high - l) * self.unit, 2)
 
 
 def plot_pixel(
@@ -77,42 +88,45 @@ def _choose_axes(panels: Sequence[PixelPanel], Ts: float) -> _Axes:
     bright = max(float(i.max()), 2 * Ts, 1e-3)
     l = l[np.isfinite(l)].clip(-bright, 1.5 * bright)
     high = 1.06 * max(bright, float(l.max(initial=0)))
-    low = min(float(l.min(initial=0)) - 0.08 * high, -0.14 * high)
-    return _Axes(low, high, side=260 if len(panels) == 1 else 150)
+    left = -BELOW * high
+    low = min(float(l.min(initial=0)) - 0.05 * high, left)
+    width, height = (200, 200) if len(panels) == 1 else (150, 200)
+    return _Axes(left, low, high, min(width / (high - left), height / (high - low)))
 
 
 def _draw(
     panel: PixelPanel, axes: _Axes, thresholds: Thresholds, current: int, names: Sequence[str]
 ) -> str:
-    width, height = LEFT + axes.side + RIGHT, TOP + axes.side + BOTTOM
+    wide, high = axes.size
+    width, height = LEFT + wide + RIGHT, TOP + high + BOTTOM
     inner = (
         _regions(axes, thresholds) + _lines(axes, thresholds) + _dots(panel, axes, current, names)
     )
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="100%" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="100%" '
         'role="img" fill="currentColor" font-family="system-ui,sans-serif" font-size="11" '
-        f'style="max-width:{2 * width}px;display:block">'
+        f'style="max-width:{width:g}px;display:block;margin:0 auto">'
         f'<text x="{LEFT}" y="14" font-weight="600">{escape(panel.title)}</text>'
-        f'<svg x="{LEFT}" y="{TOP}" width="{axes.side}" height="{axes.side}">{inner}</svg>'
+        f'<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{high}">{inner}</svg>'
         f"{_frame(axes)}</svg>"
     )
 
 
 def _regions(axes: _Axes, thresholds: Thresholds) -> str:
-    """The classes of Eq. (3) as areas, each with its letter; the square clips what sticks out."""
-    low, high, far = axes.low, axes.high, 3 * axes.high
+    """The classes of Eq. (3) as areas, each with its letter; the plot clips what sticks out."""
+    left, low, high, far = axes.left, axes.low, axes.high, 3 * axes.high
     T, Ts = thresholds.T, thresholds.Ts
     upper, lower = 1 + T, 1 - T
     wedge_end = [(high, lower * high), (Ts, lower * Ts)]
     areas: list[tuple[Factor, list[Point]]] = [
-        (Factor.ATTACHED, [(low, low), (Ts, low), (Ts, 0), (low, 0)]),
-        (Factor.CAST, [(low, 0), (Ts, 0), (Ts, far), (low, far)]),
+        (Factor.ATTACHED, [(left, low), (Ts, low), (Ts, 0), (left, 0)]),
+        (Factor.CAST, [(left, 0), (Ts, 0), (Ts, far), (left, far)]),
         (Factor.DIFFUSE, [(Ts, upper * Ts), (high, upper * high), *wedge_end]),
         (Factor.SPECULAR, [(Ts, 0), (high, 0), *wedge_end]),
         (Factor.UNDEFINED, [(Ts, upper * Ts), (high, upper * high), (high, far), (Ts, far)]),
         (Factor.UNDEFINED, [(Ts, low), (high, low), (high, 0), (Ts, 0)]),
     ]
-    middle, dark = (Ts + high) / 2, (low + Ts) / 2
+    middle, dark = (Ts + high) / 2, (left + Ts) / 2
     letters: list[tuple[Factor, Point]] = [
         (Factor.ATTACHED, (dark, low / 2)),
         (Factor.CAST, (dark, high / 2)),
@@ -133,10 +147,10 @@ def _regions(axes: _Axes, thresholds: Thresholds) -> str:
 
 
 def _lines(axes: _Axes, thresholds: Thresholds) -> str:
-    low, high, T, Ts = axes.low, axes.high, thresholds.T, thresholds.Ts
+    left, low, high, T, Ts = axes.left, axes.low, axes.high, thresholds.T, thresholds.Ts
     lines: list[tuple[str, Point, Point]] = [
-        ('stroke-opacity="0.35"', (low, low), (high, high)),
-        ('stroke-opacity="0.5"', (low, 0), (high, 0)),
+        ('stroke-opacity="0.35"', (left, left), (high, high)),
+        ('stroke-opacity="0.5"', (left, 0), (high, 0)),
         ('stroke-dasharray="4 3"', (Ts, low), (Ts, high)),
         (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 - T) * Ts), (high, (1 - T) * high)),
         (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 + T) * Ts), (high, (1 + T) * high)),
@@ -169,34 +183,36 @@ def _dot(panel: PixelPanel, k: int, axes: _Axes, name: str, *, ringed: bool) -> 
 
 def _frame(axes: _Axes) -> str:
     """Border, ticks and names of the axes, and the letter of the wedge, too thin to hold one."""
-    side = axes.side
+    wide, high = axes.size
     parts = [
-        f'<rect x="{LEFT}" y="{TOP}" width="{side}" height="{side}" fill="none" '
+        f'<rect x="{LEFT}" y="{TOP}" width="{wide}" height="{high}" fill="none" '
         'stroke="currentColor" stroke-opacity="0.5"/>'
-        f'<text x="{LEFT + side + 4}" y="{TOP + 9}" font-weight="600" '
+        f'<text x="{LEFT + wide + 4:g}" y="{TOP + 9}" font-weight="600" '
         f'fill="{_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
     ]
-    for value in _ticks(axes):
-        x, y = axes.at(value, value)
+    for value in _ticks(axes.left, axes.high):
+        x, _ = axes.at(value, 0)
         parts.append(
-            f'<text x="{LEFT + x:g}" y="{TOP + side + 14}" text-anchor="middle">{value:g}</text>'
-            f'<text x="{LEFT - 5}" y="{TOP + y + 4:g}" text-anchor="end">{value:g}</text>'
+            f'<text x="{LEFT + x:g}" y="{TOP + high + 14:g}" text-anchor="middle">{value:g}</text>'
         )
+    for value in _ticks(axes.low, axes.high):
+        _, y = axes.at(0, value)
+        parts.append(f'<text x="{LEFT - 5}" y="{TOP + y + 4:g}" text-anchor="end">{value:g}</text>')
     parts.append(
-        f'<text x="{LEFT + side / 2:g}" y="{TOP + side + 30}" text-anchor="middle">'
+        f'<text x="{LEFT + wide / 2:g}" y="{TOP + high + 30:g}" text-anchor="middle">'
         "input i (of full scale)</text>"
-        f'<text transform="translate(10 {TOP + side / 2:g}) rotate(-90)" text-anchor="middle">'
+        f'<text transform="translate(10 {TOP + high / 2:g}) rotate(-90)" text-anchor="middle">'
         "linearized l (of full scale)</text>"
     )
     return "".join(parts)
 
 
-def _ticks(axes: _Axes) -> list[float]:
+def _ticks(low: float, high: float) -> list[float]:
     """Three to seven round numbers inside the range."""
-    span = axes.high - axes.low
+    span = high - low
     power = 10.0 ** np.floor(np.log10(span / 3))
     step = max(s * power for s in (1, 2, 5) if s * power <= span / 3)
-    numbers = range(int(np.ceil(axes.low / step)), int(np.floor(axes.high / step)) + 1)
+    numbers = range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)
     return [round(n * step, 10) for n in numbers]
 
 

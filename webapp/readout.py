@@ -1,7 +1,7 @@
 """The sentences of the inspector. Pure; plain text, to be passed through `escape` into markup.
 
-Intensities are fractions of full scale, with three decimals; more where three would hide why
-a comparison came out as it did.
+Intensities are fractions of full scale, with three decimals; thresholds and what is compared with
+them have four, and more where four would hide why a comparison came out as it did.
 """
 
 import re
@@ -85,7 +85,8 @@ def describe_pixel(
     if not inside:
         return f"{where} lies outside the mask: nothing was computed there."
     lit = int(np.count_nonzero(np.asarray(i, np.float32) >= np.float32(thresholds.Ts)))
-    sentence = f"{where} is lit (i ≥ Ts = {_number(thresholds.Ts)}) in {lit} of {len(i)} images"
+    level = _threshold(thresholds.Ts)
+    sentence = f"{where} is lit (i ≥ Ts = {level}) in {lit} of {len(i)} images"
     if lit < 3:
         return f"{sentence}: its linearized value cannot be determined."
     return f"{sentence}."
@@ -123,7 +124,7 @@ def threshold_status(shown: Thresholds, used: Thresholds | None) -> str:
         return f"Labels and linearized bases: T {T}, Ts {Ts}."
     return (
         f"Labels: T {T}, Ts {Ts}. Linearized bases: T {T_used}, Ts {Ts_used}; "
-        "run again to compute them with the present thresholds."
+        "linearize again to match."
     )
 
 
@@ -133,9 +134,9 @@ def summarize(analysis: Analysis) -> str:
     bases = ", ".join(analysis.names[k] for k in analysis.base_images)
     count = int(np.count_nonzero(analysis.mask))
     return (
-        f"{analysis.options.method}: {K} images of {W} x {H}, {count} pixels in the mask, "
-        f"base images {bases}, T {_number(analysis.thresholds.T)}, "
-        f"Ts {_number(analysis.thresholds.Ts)}, {analysis.seconds['total']:.2f} s."
+        f"{analysis.options.method}: {K} images of {H} rows × {W} columns, {count} pixels in the "
+        f"mask, base images {bases}, T {_threshold(analysis.thresholds.T)}, "
+        f"Ts {_threshold(analysis.thresholds.Ts)}, {analysis.seconds['total']:.2f} s."
     )
 
 
@@ -144,9 +145,14 @@ def _number(value: float) -> str:
     return f"{value:.1e}" if 0 < abs(value) < 0.0005 else f"{value:z.3f}"
 
 
+def _threshold(value: float) -> str:
+    """Four decimals, the sliders' step being 0.0005; scientific where that would read as zero."""
+    return f"{value:.1e}" if 0 < value < 0.00005 else f"{value:.4f}"
+
+
 def _apart(a: float, b: float) -> tuple[str, str]:
-    """Both numbers with as many decimals, 3 to 8, as it takes to tell them apart."""
-    decimals = 3
+    """Both numbers with as many decimals, 4 to 8, as it takes to tell them apart."""
+    decimals = 4
     while f"{a:z.{decimals}f}" == f"{b:z.{decimals}f}" and a != b and decimals < 8:
         decimals += 1
     return f"{a:z.{decimals}f}", f"{b:z.{decimals}f}"

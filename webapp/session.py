@@ -7,7 +7,8 @@ reports through the same worker.
 """
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from threading import Event, Thread
@@ -20,7 +21,7 @@ from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import LETTERS, Thresholds
 
 from .canvas import Canvas, Pixel
-from .downloads import make_download, relabel
+from .downloads import Pack, make_download, relabel
 from .frame import Frame, compose
 from .job import Job
 from .painter import Painter
@@ -41,13 +42,16 @@ REST = 0.3
 FIRST = Thresholds(0.05, 0.02)
 """Where the sliders stand until thresholds are given or suggested."""
 
+EMPTY = "linearize again starts anew"
+"""What follows from cancelling the first run."""
+
 
 class Session:
     """The widgets, the state and the worker of one tab."""
 
-    def __init__(self, client: viser.ClientHandle, runs: Runs) -> None:
+    def __init__(self, client: viser.ClientHandle, runs: Runs, pack: Pack) -> None:
         """Build the tab and start to work for it."""
-        self._client, self._runs, self._stack = client, runs, runs.stack
+        self._client, self._runs, self._stack, self._pack = client, runs, runs.stack, pack
         self._results: dict[Method, Analysis] = {}
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
@@ -180,7 +184,8 @@ class Session:
         if thresholds is not None:
             options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
         self._declined = frozenset((*self._declined, method))
-        result = self._runs.run(options, self._run.progress, self._job.stopping)
+        with cancelling("linearization", "the earlier result is kept" if self._results else EMPTY):
+            result = self._runs.run(options, self._run.progress, self._job.stopping)
         self._declined = frozenset(m for m in self._declined if m != method)
         untouched = not self._results and self._read().thresholds == self._first
         self._results = {**self._results, method: result}
@@ -188,7 +193,9 @@ class Session:
             self._thresholds.set(result.thresholds)
 
     def _set_suggested(self) -> None:
-        self._thresholds.set(self._runs.suggest(self._run.progress, self._job.stopping))
+        with cancelling("suggestion", "T and Ts are kept"):
+            suggested = self._runs.suggest(self._run.progress, self._job.stopping)
+        self._thresholds.set(suggested)
 
     def _send(self, state: ViewState, kind: str, everything: bool) -> None:
         analysis = self._results.get(state.method)
@@ -196,7 +203,7 @@ class Session:
             raise OptionError("there is no result to export yet; linearize first")
         self._run.progress("writing files", 0.5)
         shown = relabel(self._stack, analysis, state.thresholds)
-        name, data = make_download(shown, kind, None if everything else state.image)
+        name, data = make_download(shown, kind, None if everything else state.image, self._pack)
         # viser's page itself tells the name and the size
         self._client.send_file_download(name, data, save_immediately=True)
 
@@ -253,3 +260,12 @@ class Session:
             return
         traceback.print_exception(error)
         self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")
+
+
+@contextmanager
+def cancelling(what: str, then: str) -> Iterator[None]:
+    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
+    try:
+        yield
+    except Cancelled as error:
+        raise Cancelled(f"{what} cancelled; {then}") from error

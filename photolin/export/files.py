@@ -3,6 +3,7 @@
 import io
 import os
 import re
+import unicodedata
 import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -21,6 +22,9 @@ from ..factors import LETTERS, OUTSIDE, PALETTE, TITLES, Factor
 
 Contents = Literal["labels", "masks", "linearized"]
 CONTENTS: tuple[Contents, ...] = get_args(Contents)
+
+REJECTED = re.compile(r'[\x00-\x1f\x7f\ud800-\udfff<>:"/\\|?*]+')
+"""Control characters, bytes that are no text, and what Windows keeps to itself."""
 
 
 def label_png(labels: NDArray[np.uint8]) -> bytes:
@@ -148,7 +152,17 @@ def _png(image: Image.Image, **options: int) -> bytes:
     return buffer.getvalue()
 
 
+def safe_name(text: str) -> str:
+    """`text` as part of a file name on any file system: letters of all alphabets stay.
+
+    What REJECTED matches becomes _; dots and spaces at the ends, and what is over 120 bytes, go.
+    """
+    name = REJECTED.sub("_", unicodedata.normalize("NFC", text))
+    return name.encode()[:120].decode(errors="ignore").strip(" .")
+
+
 def _stem(analysis: Analysis, k: int) -> str:
-    """Image number and name, without what a file system or archive could stumble over."""
-    stem = re.sub(r"[^A-Za-z0-9-]+", "_", Path(analysis.names[k]).stem).strip("_")[:60]
-    return f"{k:03d}_{stem}".rstrip("_")
+    """Image number and name; the number alone where that is the name."""
+    stem = safe_name(Path(analysis.names[k]).stem)
+    named = stem and not (stem.isdecimal() and int(stem) == k)
+    return f"{k:03d}_{stem}" if named else f"{k:03d}"

@@ -76,6 +76,20 @@ def save_result(
     """
     folder = Path(folder)
     check_output(folder)
+    files = result_files(
+        analysis, command=command, stack_path=stack_path, load_options=load_options
+    )
+    write_files(folder, files)
+
+
+def result_files(
+    analysis: Analysis,
+    *,
+    command: str | None = None,
+    stack_path: str | Path | None = None,
+    load_options: LoadOptions | None = None,
+) -> dict[str, bytes]:
+    """Encode what `save_result` writes, by the same arguments: file name to bytes."""
     arrays = result_npz(analysis)
     report = describe_analysis(analysis) | {
         "command": command,
@@ -83,8 +97,7 @@ def save_result(
         "load": None if load_options is None else describe_reading(load_options),
         "result_sha256": hashlib.sha256(arrays).hexdigest(),
     }
-    text = json.dumps(report, indent=1) + "\n"
-    write_files(folder, {RESULT: arrays, REPORT: text.encode()})
+    return {RESULT: arrays, REPORT: (json.dumps(report, indent=1) + "\n").encode()}
 
 
 def check_output(folder: str | Path) -> None:
@@ -176,17 +189,16 @@ def load_result_stack(path: str | Path, stack_path: str | Path | None = None) ->
         InputError: the images have moved or changed.
     """
     file = _result_file(path)
-    report = read_report(file)
-    place = stack_path or report["stack"]
-    if place is None or not Path(place).exists():
+    was, options = load_result_source(path)
+    place = was if stack_path is None else Path(stack_path)
+    if place is None or not place.exists():
         where = "nothing says where they were" if place is None else f"{place} is missing"
         raise InputError(f"{file}: its images are not found ({where}); name them with --stack")
     try:
-        options = restore_reading(report["load"])
-        known = {entry["sha256"] for entry in report["files"]}
-    except (KeyError, TypeError, ValueError, AttributeError, PhotolinError) as error:
+        known = {entry["sha256"] for entry in read_report(file)["files"]}
+    except (KeyError, TypeError) as error:
         raise foreign(file.with_name(REPORT)) from error
-    stack = load_stack(Path(place), options)
+    stack = load_stack(place, options)
     changed = [name for name, digest in stack.files if digest not in known]
     if changed:
         raise InputError(
@@ -194,6 +206,21 @@ def load_result_stack(path: str | Path, stack_path: str | Path | None = None) ->
             "run again, or name the right images with --stack"
         )
     return stack
+
+
+def load_result_source(path: str | Path) -> tuple[Path | None, LoadOptions]:
+    """Where the stack of a result was, if the report says so, and how it was read.
+
+    Raises:
+        InputError: a file is missing, cut short, or not a photolin result.
+    """
+    file = _result_file(path)
+    report = read_report(file)
+    try:
+        place = None if report["stack"] is None else Path(report["stack"])
+        return place, restore_reading(report["load"])
+    except (KeyError, TypeError, ValueError, AttributeError, PhotolinError) as error:
+        raise foreign(file.with_name(REPORT)) from error
 
 
 def is_result(path: str | Path) -> bool:

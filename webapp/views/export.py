@@ -6,18 +6,21 @@ import viser
 
 from ..values import choose_option
 
+RESULT = "result (npz and json, zip)"
 KINDS = {
     "masks (PNG, zip)": "masks",
     "label maps (indexed PNG, zip)": "labels",
     "linearized (float32 TIFF)": "linearized",
-    "everything (result.npz)": "result",
+    RESULT: "result",
 }
 TEXT = """
 - **masks**: for each class a picture that is white where a pixel belongs to it
 - **label maps**: one picture for each image, in the colours of the legend; its pixel values are
   0 U, 1 D, 2 S, 3 A, 4 C, and 255 outside the mask
 - **linearized**: diffuse reflection alone, signed, as fraction of full scale, not rounded
-- **result.npz**: labels, coefficients and linearized bases as NumPy arrays
+- **result**: what `photolin run` writes, of all images. result.npz holds labels, coefficients and
+  linearized bases as NumPy arrays, report.json how they came about. Unpacked into a folder,
+  `photolin inspect` opens them again
 
 Labels are by T and Ts as the sliders stand, of the method shown. Files go where the browser keeps
 its downloads.
@@ -30,9 +33,13 @@ class ExportView:
 
     def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
-        self._images = gui.add_dropdown("Of", (THIS, ALL), hint="result.npz holds all images")
+        self._images = gui.add_dropdown("Of", (THIS, ALL), hint="A result is of all images")
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         gui.add_markdown(TEXT)
+
+        @self._kind.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            self._images.disabled = self._kind.value == RESULT
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:

@@ -29,10 +29,19 @@ class LegendView:
             for number, (factor, letter) in enumerate(LETTERS.items(), 1)
         }
         self._opacity = gui.add_slider(
-            "Opacity", 0.0, 1.0, 0.05, 0.55, hint="Of the overlay; diffuse is drawn fainter"
+            "Opacity",
+            0.0,
+            1.0,
+            0.05,
+            0.55,
+            marks=(),
+            hint="Of the overlay; diffuse is drawn fainter",
         )
         self._outlines = gui.add_checkbox(
-            "outlines", False, hint="Draw the borders of the classes instead of their areas"
+            "outlines",
+            False,
+            hint="Draw the borders of the classes instead of their areas, "
+            "also over linearized and residual",
         )
         self._gain = gui.add_slider(
             "Brightness",
@@ -40,6 +49,7 @@ class LegendView:
             MAX_GAIN,
             0.1,
             self._first_gain,
+            marks=(),
             hint="Factor for showing the input; stored values are not changed",
         )
         for handle in (*self._switches.values(), self._opacity, self._outlines, self._gain):

@@ -12,6 +12,7 @@ from ..frame import Frame
 from ..readout import escape
 from ..state import LAYERS, ViewState
 from ..values import choose_option, clamp_integer
+from . import INDENT
 
 PREVIOUS, NEXT, FIT, ONE_TO_ONE = "◀ previous", "next ▶", "fit", "1:1"
 
@@ -35,6 +36,7 @@ class PictureView:
             self._count - 1,
             1,
             0,
+            marks=(),  # their numbers would lie under the handle
             hint="Image number, from 0 (keys: left and right arrow)",
         )
         self._buttons = gui.add_button_group(" ", (PREVIOUS, NEXT, FIT, ONE_TO_ONE))
@@ -43,8 +45,8 @@ class PictureView:
             LAYERS,
             initial_value="input",
             hint="input: as photographed. linearized: diffuse reflection alone, signed, zero is "
-            "mid-grey. residual: input minus linearized, zero is white. labels: the label map "
-            "alone (keys: up and down arrow)",
+            "mid-grey. residual: input minus linearized, zero is white. Both show labels only as "
+            "outlines. labels: the label map alone (keys: up and down arrow)",
         )
         for handle in (self._image, self._layer):
 
@@ -85,7 +87,7 @@ class PictureView:
         K, H, W = frame.stack.shape
         file = frame.stack.names[frame.state.image]
         self._name.content = (
-            f'<div style="padding:0 1em;font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
+            f'<div style="{INDENT};font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
             f"&nbsp;{K} images, {H} rows × {W} columns &nbsp;<b>{escape(Path(file).name)}</b></div>"
         )
 

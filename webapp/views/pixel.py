@@ -11,6 +11,7 @@ from ..frame import Frame, PixelValues, pixel_values
 from ..plots import PixelPanel, plot_pixel
 from ..readout import describe_pixel, escape, explain
 from ..state import ViewState
+from . import INDENT
 
 ALONE = "no other method"
 CHOICES: tuple[str, ...] = (ALONE, *METHODS)
@@ -38,10 +39,10 @@ class PixelView:
         return replace(state, beside=None if beside == state.method else beside)
 
     def draw(self, frame: Frame) -> None:
-        """Plot the pixel and say which rule decided."""
+        """Plot the pixel and say which rule decided, by each method."""
         state, stack = frame.state, frame.stack
         if state.pixel is None or frame.analysis is None:
-            self._plot.content = _text("Click a pixel to see why it is labelled as it is.")
+            self._plot.content = _text(_invite(state))
             return
         row, column = state.pixel
         if not stack.mask[row, column]:
@@ -52,17 +53,22 @@ class PixelView:
         results = [a for a in (frame.analysis, frame.beside) if a is not None]
         values = [pixel_values(stack, a, state.pixel, state.thresholds) for a in results]
         panels = [_panel(a, v) for a, v in zip(results, values, strict=True)]
-        width = 280 if len(panels) == 1 else 600
         plot = plot_pixel(panels, state.thresholds, state.image, stack.names)
-        k, own = state.image, values[0]
-        sentences = (
-            explain(float(own.i[k]), float(own.l[k]), state.thresholds, f"Image {k}"),
-            describe_pixel(row, column, own.i, state.thresholds),
-        )
-        self._plot.content = (
-            f'<div style="max-width:{width}px;margin:0 auto;padding:0 0.8em">{plot}</div>'
-            f"{_text(*sentences)}"
-        )
+        k = state.image
+        sentences = []
+        for panel in panels:
+            name = f"{panel.title}, image {k}" if len(panels) > 1 else f"Image {k}"
+            sentences.append(explain(float(panel.i[k]), float(panel.l[k]), state.thresholds, name))
+        if state.beside is not None and frame.beside is None:
+            sentences.append(f"There is no result by {state.beside} yet.")
+        sentences.append(describe_pixel(row, column, values[0].i, state.thresholds))
+        self._plot.content = f'<div style="{INDENT}">{plot}</div>{_text(*sentences)}'
+
+
+def _invite(state: ViewState) -> str:
+    if state.beside is None:
+        return "Click a pixel to see why it is labelled as it is."
+    return f"Click a pixel to see why {state.method} and {state.beside} label it as they do."
 
 
 def _panel(analysis: Analysis, values: PixelValues) -> PixelPanel:
@@ -71,6 +77,6 @@ def _panel(analysis: Analysis, values: PixelValues) -> PixelPanel:
 
 def _text(*sentences: str) -> str:
     return (
-        '<div style="padding:0 1em;font-size:0.85em">'
+        f'<div style="{INDENT};font-size:0.85em">'
         f"{'<br>'.join(escape(sentence) for sentence in sentences)}</div>"
     )

@@ -10,6 +10,7 @@ from photolin.analysis import METHODS, Method
 from ..readout import escape
 from ..state import ViewState
 from ..values import choose_option
+from . import INDENT
 
 
 class RunView:
@@ -55,7 +56,7 @@ class RunView:
 
     def progress(self, stage: str, fraction: float) -> None:
         """Show how far a run has come; the bar is never empty, so that it is seen to move."""
-        self._stage.content = f'<div style="padding:0 1em;font-size:0.8em">{escape(stage)}</div>'
+        self._stage.content = f'<div style="{INDENT};font-size:0.8em">{escape(stage)}</div>'
         self._bar.value = round(100 * min(max(fraction, 0.04), 1))
 
     def read(self, state: ViewState) -> ViewState:

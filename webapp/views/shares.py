@@ -1,31 +1,47 @@
 """How much of the image shown each class takes."""
 
+import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from photolin.factors import PALETTE
 
 from ..frame import Frame
-from ..readout import legend
+from ..readout import escape, legend
+from . import INDENT
 
 
 class SharesView:
-    """One line of colours, letters and percentages."""
+    """Colours, letters and percentages, a line for each method."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._strip = gui.add_html("")
 
     def draw(self, frame: Frame) -> None:
-        """Counts and shares of the image shown, inside the mask."""
-        if frame.labels is None:
-            self._strip.content = ""
-            return
-        cells = [
-            f'<span style="white-space:nowrap" title="{row.title}: {row.count} pixels">'
-            f'<span style="display:inline-block;width:0.7em;height:0.7em;border-radius:2px;'
-            f'background:rgb{PALETTE[row.factor]}"></span> {row.letter} {row.percent:.1f} %</span>'
-            for row in legend(frame.labels)
+        """Shares of the image shown, inside the mask; a second line for the method beside it."""
+        rows = [
+            (analysis.options.method, labels)
+            for analysis, labels in (
+                (frame.analysis, frame.labels),
+                (frame.beside, frame.beside_labels),
+            )
+            if analysis is not None and labels is not None
         ]
-        self._strip.content = (
-            '<div style="padding:0 1em;font-size:0.85em;display:flex;flex-wrap:wrap;gap:0 0.8em;'
-            f'font-variant-numeric:tabular-nums">{"".join(cells)}</div>'
+        self._strip.content = "".join(
+            _strip(labels, method if len(rows) > 1 else "") for method, labels in rows
         )
+
+
+def _strip(labels: NDArray[np.uint8], method: str) -> str:
+    cells = [
+        f'<span style="white-space:nowrap" title="{row.title}: {row.count} pixels">'
+        f'<span style="display:inline-block;width:0.7em;height:0.7em;border-radius:2px;'
+        f'background:rgb{PALETTE[row.factor]}"></span> {row.letter} {row.percent:.1f} %</span>'
+        for row in legend(labels)
+    ]
+    name = f'<span style="width:100%">{escape(method)}</span>' if method else ""
+    return (
+        f'<div style="{INDENT};font-size:0.85em;display:flex;'
+        'flex-wrap:wrap;gap:0 0.8em;font-variant-numeric:tabular-nums">'
+        f"{name}{''.join(cells)}</div>"
+    )

@@ -4,6 +4,7 @@ import viser
 
 from ..frame import Frame
 from ..readout import escape, summarize
+from . import ATTENTION, INDENT
 
 
 class SummaryView:
@@ -17,10 +18,10 @@ class SummaryView:
         result = frame.analysis
         told = frame.stack if result is None else result
         warnings = "".join(
-            f'<li style="color:#E69F00">{escape(warning)}</li>' for warning in told.warnings
+            f'<li style="{ATTENTION}">{escape(warning)}</li>' for warning in told.warnings
         )
         facts = ([summarize(result)] if result else []) + list(told.notes)
         self._text.content = (
-            '<ul style="padding:0 1em 0 2em;margin:0;font-size:0.8em">'
+            f'<ul style="{INDENT} 0 2em;margin:0;font-size:0.8em">'
             f"{warnings}{''.join(f'<li>{escape(fact)}</li>' for fact in facts)}</ul>"
         )

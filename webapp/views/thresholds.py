@@ -11,6 +11,7 @@ from ..frame import Frame
 from ..readout import escape, threshold_status
 from ..state import ViewState
 from ..values import clamp_number
+from . import ATTENTION
 
 STEP = 0.0005
 RANGES = {"T": (0.0005, 0.2), "Ts": (0.0, 0.2)}
@@ -34,6 +35,7 @@ class ThresholdView:
             *RANGES["T"],
             STEP,
             RANGES["T"][0],
+            marks=(),
             hint="Relative tolerance: an observation i counts as diffuse while |i - l| is at most "
             "T times i (keys: [ and ])",
         )
@@ -42,6 +44,7 @@ class ThresholdView:
             *RANGES["Ts"],
             STEP,
             RANGES["Ts"][0],
+            marks=(),
             hint="Shadow level, fraction of full scale: darker observations are shadow "
             "(keys: { and })",
         )
@@ -93,8 +96,8 @@ class ThresholdView:
         """Say what the labels and what the bases were computed with."""
         used = None if frame.analysis is None else frame.analysis.thresholds
         shown = frame.state.thresholds
-        colour = "inherit" if used in (None, shown) else "#D55E00"
+        stale = "" if used in (None, shown) else ATTENTION
         self._status.content = (
-            f'<div style="padding:0 1em;font-size:0.8em;color:{colour}">'
+            f'<div style="margin:0 var(--mantine-spacing-xs);font-size:0.8em;{stale}">'
             f"{escape(threshold_status(shown, used))}</div>"
         )
