@@ -72,16 +72,24 @@ def test_the_winner_has_the_most_support_of_the_candidates_drawn() -> None:
     np.testing.assert_allclose(found, candidates[support.argmax()], rtol=1e-5)
 
 
-def test_samples_solve_their_observations_and_singular_ones_are_dropped() -> None:
+def test_samples_solve_their_observations_and_singular_ones_are_drawn_again() -> None:
     rng = np.random.default_rng(0)
     A = rng.normal(size=(3, 5))
     A[:, 1] = 2 * A[:, 0]
     triples, inverses = draw_samples(A, 300, rng)
-    assert 0 < len(triples) < 300
+    assert len(triples) == len(inverses) == 300
     for triple, inverse in zip(triples, inverses, strict=True):
         assert len(set(triple)) == 3
         assert not {0, 1} <= set(triple)
         np.testing.assert_allclose(inverse @ A[:, triple].T, np.eye(3), atol=1e-3)
+
+
+def test_drawing_ends_where_hardly_any_sample_is_regular() -> None:
+    A = np.zeros((3, 100))
+    A[:, :3] = np.eye(3)
+    triples, _ = draw_samples(A, 2000, np.random.default_rng(0))
+    assert len(triples) < 2000
+    assert {tuple(sorted(t)) for t in triples.tolist()} <= {(0, 1, 2)}
 
 
 def test_samples_of_next_to_nothing_are_dropped_without_a_warning() -> None:

@@ -64,10 +64,11 @@ def describe_analysis(analysis: Analysis) -> dict[str, Any]:
             "counts": {TITLES[factor]: int((row == factor).sum()) for factor in Factor},
             "support": float(fitting.mean()),
         }
-        for name, row, fitting in zip(analysis.names, inside, supported, strict=True)
+        | describe_confidence(analysis, k)
+        for k, (name, row, fitting) in enumerate(
+            zip(analysis.names, inside, supported, strict=True)
+        )
     ]
-    for k, image in enumerate(images):
-        image |= describe_confidence(analysis, k)
     return {
         "version": program_version(),
         "title": analysis.title,
