@@ -16,6 +16,7 @@ from photolin.synthetic import render_scene
 from webapp import painter as module
 from webapp.frame import Frame, compose
 from webapp.painter import Painter, describe, render_layer
+from webapp.render import choose_scale, render_residual
 from webapp.state import ViewState
 
 STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
@@ -185,10 +186,11 @@ def test_layers_show_zero_as_mid_grey_or_white() -> None:
     assert ((linearized < 128) <= (RESULT.linearized(0) < 0)).all()
     assert "zero mid-grey" in text
     residual, text = render_layer(frame(layer="residual"))
-    apart = np.abs(STACK.images[0] - RESULT.linearized(0))
-    near = apart < 1e-3 * apart.max()
-    assert near.any()
-    assert (residual[near] == 255).all()
+    excess = STACK.images[0] - RESULT.linearized(0)
+    scale = choose_scale(excess, STACK.mask)
+    expected = render_residual(excess, scale)
+    assert np.array_equal(residual, expected)
+    assert (render_residual(np.zeros((1, 1), np.float32), scale) == 255).all()
     assert "zero white" in text
 
 
