@@ -106,7 +106,10 @@ INGREDIENTS: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
     "no balance of directions": lambda patch: patch.setattr(
         factorize, "balance_directions", lambda bases, rng: bases
     ),
-    "no refinement": lambda patch: patch.setattr(refine, "ROUNDS", 1),
+    "one round of refinement": lambda patch: (
+        patch.setattr(refine, "ROUNDS", 1),
+        patch.setattr(refine, "EARLY", 0),
+    )[0],
     "no annealing": lambda patch: patch.setattr(refine, "FIRST_WIDTH", refine.LAST_WIDTH),
     "no weighted last fit": lambda patch: (
         patch.setattr(linearize, "REACH", 0.0),
