@@ -12,12 +12,13 @@ from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from .analysis import METHODS, Analysis, Options, Progress
 from .console import (
+    MEASURES,
     complain,
     mend_streams,
     parse,
@@ -166,7 +167,7 @@ def export(
     out: Positional[Path],
     *,
     what: tuple[Contents, ...] = CONTENTS,
-    image: tuple[int, ...] = (),
+    image: Annotated[tuple[int, ...], arg(help_behavior_hint="")] = (),
 ) -> None:
     """Write the label maps, masks and linearized images of a result as files.
 
@@ -214,6 +215,7 @@ def evaluate(
         result = load_result(path)
         title = f"{result.title}, {result.options.method}, {thresholds(result)}"
         print(format_evaluation(_measure(result, load_truth(truth), _stack_of(path)), title))
+        print(MEASURES)
         return
     answer = load_truth(path if truth is None else truth)
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
@@ -225,6 +227,7 @@ def evaluate(
     for result in results:
         print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
     print(compare_with_paper({r.options.method: _measure(r, answer, images) for r in results}))
+    print(MEASURES)
 
 
 @verb
@@ -256,7 +259,7 @@ def synth(
     )
     write_scene(scene, out)
     K, H, W = scene.stack.shape
-    print(f"written {K} images of {H} x {W} and gt.npz to {out}")
+    print(f"written {K} images of {H} rows x {W} columns and gt.npz to {out}")
 
 
 @verb

@@ -8,9 +8,20 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
+from dataclasses import replace
+from functools import reduce
+from operator import or_
+from types import NoneType
+from typing import get_args
 
 import tyro
 from tqdm import tqdm
+from tyro.constructors import (
+    ConstructorRegistry,
+    PrimitiveConstructorSpec,
+    PrimitiveTypeInfo,
+    UnsupportedTypeAnnotationError,
+)
 
 from .analysis import Analysis, Cancel, Progress
 from .compiling import COMPILING, tell_compiling
@@ -27,10 +38,14 @@ STYLE = (
     tyro.conf.OmitArgPrefixes,
     tyro.conf.PositionalMetavarFromFieldName,
 )
+KINDS = ConstructorRegistry()
+"""How tyro is to read what it would read or show badly."""
 
 
 def parse(verbs: dict[str, Callable[..., Call]], arguments: Sequence[str]) -> Call:
     """The call a command line asks for; OptionError in one line instead of tyro's box."""
+    if arguments and not arguments[0].startswith("-") and arguments[0] not in verbs:
+        raise OptionError(f"{arguments[0]} is no verb; accepted are {', '.join(verbs)}")
     box = io.StringIO()
     try:
         with redirect_stderr(box):
@@ -40,6 +55,7 @@ def parse(verbs: dict[str, Callable[..., Call]], arguments: Sequence[str]) -> Ca
                 description="Tell diffuse, specular, attached and cast shadow apart.",
                 args=list(arguments),
                 config=STYLE,
+                registry=KINDS,
             )
     except SystemExit as stop:
         if not stop.code:
@@ -97,13 +113,36 @@ def _unbox(box: str) -> str:
         if not rule and not line.startswith(" " * 8):
             body.append(line)
     sentence = " ".join(" ".join(body).split()).rstrip(".")
-    value = re.fullmatch(
-        r"Error parsing (\S+): no type matching (.+) could be instantiated from \[(.+)\]", sentence
+    return re.sub(r"^Error parsing (\S+): (?=.* is accepted$)", r"\1 is ", sentence)
+
+
+@KINDS.primitive_rule
+def _optional(
+    info: PrimitiveTypeInfo,
+) -> PrimitiveConstructorSpec | UnsupportedTypeAnnotationError | None:
+    """`X | None` as X: its default is called unset, and several numbers stand in no braces."""
+    kinds = [kind for kind in get_args(info.type) if kind is not NoneType]
+    if len(kinds) == len(get_args(info.type)):
+        return None
+    inner = PrimitiveTypeInfo.make(reduce(or_, kinds), info.markers)
+    spec = ConstructorRegistry.get_primitive_spec(inner)
+    if isinstance(spec, UnsupportedTypeAnnotationError):
+        return spec
+    metavar = re.sub(r"\{(\w+)\}", r"\1", spec.metavar)
+
+    def read(given: list[str]) -> object:
+        try:
+            return spec.instance_from_str(given)
+        except ValueError as error:
+            raise ValueError(f"{' '.join(given)}; {metavar} is accepted") from error
+
+    return replace(
+        spec,
+        metavar=metavar,
+        instance_from_str=read,
+        is_instance=lambda value: value is None or spec.is_instance(value),
+        str_from_instance=lambda v: ["unset"] if v is None else spec.str_from_instance(v),
     )
-    if value is None:
-        return sentence
-    option, accepted, given = (re.sub(r"[{}',]", "", group) for group in value.groups())
-    return f"{option} is {given}; {accepted} is accepted"
 
 
 @contextmanager
@@ -154,7 +193,7 @@ def run_summary(result: Analysis) -> str:
     K, H, W = result.labels.shape
     return "\n".join(
         [
-            f"{result.title}: {K} images of {H} x {W}, method {result.options.method}",
+            f"{result.title}: {K} images of {H} rows x {W} columns, method {result.options.method}",
             f"thresholds: {thresholds(result)}",
             f"base images: {bases}",
             f"labels: {shares}",
@@ -173,12 +212,20 @@ def stack_summary(stack: ImageStack) -> str:
     ]
     return "\n".join(
         [
-            f"{stack.title}: {K} images of {H} x {W} (rows x columns)",
+            f"{stack.title}: {K} images of {H} rows x {W} columns",
             *remarks(stack),
             "image  mean    max     name (fractions of full scale, inside the mask)",
             *rows,
         ]
     )
+
+
+MEASURES = """\
+macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect
+rms: root mean square of linearized minus ideal image, fraction of full scale
+p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale
+light error: mean angle between true and estimated lights, up to one linear map for all, degrees"""
+"""What the numbers of an evaluation mean, a line each."""
 
 
 def remarks(of: ImageStack | Analysis) -> list[str]:

@@ -173,7 +173,7 @@ def test_export_writes_what_was_asked(result: Path, tmp_path: Path) -> None:
 def test_info_says_what_was_read(stack: Path, capsys) -> None:
     assert main(["info", str(stack)]) == 0
     said = capsys.readouterr().out
-    assert "8 images of 48 x 64" in said
+    assert "8 images of 48 rows x 64 columns" in said
     assert "16-bit" in said
     assert "007.png" in said
 
@@ -183,6 +183,7 @@ def test_evaluate_measures_a_result(stack: Path, result: Path, capsys) -> None:
     said = capsys.readouterr().out
     assert "robust, T 0.02, Ts 0.005" in said
     assert "macro accuracy" in said
+    assert all(f"\n{name}: " in said for name in ("macro", "rms", "p99", "light error"))
 
 
 def test_evaluate_sets_all_methods_beside_the_paper(stack: Path, capsys) -> None:
@@ -192,6 +193,7 @@ def test_evaluate_sets_all_methods_beside_the_paper(stack: Path, capsys) -> None
     for method in ("robust", "classification", "statistical"):
         assert f"{method}: T 0.02, Ts 0.005" in said
     assert re.search(r"\| +0\.00 +0\.00 +17\.49 +82\.51", said)
+    assert all(f"\n{name}: " in said for name in ("macro", "rms", "p99", "light error"))
     widths = {len(line) for line in said.splitlines() if "|" in line and "paper" not in line}
     assert len(widths) == 1
 
@@ -204,7 +206,9 @@ def test_evaluate_needs_the_truth_of_a_result(result: Path, capsys) -> None:
     ("arguments", "words"),
     [
         ([], "Expected one of {run, inspect, export, evaluate, synth, info}"),
-        (["fly"], "fly; photolin --help lists"),
+        (["fly"], "fly is no verb; accepted are run, inspect, export, evaluate, synth, info\n"),
+        (["Run", "a", "b"], "Run is no verb; accepted are run, "),
+        (["--fly"], "--fly; photolin --help lists"),
         (["run"], "STACK OUT; photolin run --help lists"),
         (["run", "a", "b", "c"], "c; photolin run --help"),
         (["run", "a", "b", "--T", "x"], "--T is x; FLOAT is accepted"),
@@ -213,7 +217,11 @@ def test_evaluate_needs_the_truth_of_a_result(result: Path, capsys) -> None:
         (["run", "a", "b", "--Ts", "1"], "Ts is 1; accepted is a number from 0 to below 1"),
         (["run", "a", "b", "--Ts"], "'--Ts'"),
         (["run", "a", "b", "--method", "magic"], "'magic' for argument '--method'"),
-        (["run", "a", "b", "--roi", "1", "2", "3"], "--roi is 1 2 3; INT INT INT INT is accepted"),
+        (
+            ["run", "a", "b", "--roi", "1", "2", "3"],
+            "'--roi'. Expected 4 values; photolin run --help",
+        ),
+        (["run", "a", "b", "--roi", *"123x"], "--roi is 1 2 3 x; INT INT INT INT is accepted"),
         (["run", "a", "b", "--base-images", "1", "1", "2"], "three different image numbers"),
         (["run", "a", "b", "--seed", "-1"], "seed is -1; accepted is 0 to"),
         (["run", "a", "b", "--nonsense"], "--nonsense"),
@@ -261,6 +269,24 @@ def test_every_verb_explains_itself(verb: str, capsys) -> None:
     described = re.split(r"╭─ (?:positional )?(?:arguments|options)", said)[0]
     assert len(described.splitlines()) > 2
     assert not re.search(r"│ \S+ +\(required\) +│", said)  # an argument without an explanation
+
+
+def test_help_shows_kinds_and_defaults_as_people_write_them(capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    for verb in VERBS:
+        assert main([verb, "--help"]) == 0
+    said = capsys.readouterr().out
+    for shown in (
+        "--base-images INT INT INT ",
+        "--lights none|PATH ",
+        "--roi INT INT INT INT ",
+        "--size INT INT ",
+        "--T FLOAT ",
+        "(default: unset)",
+    ):
+        assert shown in said
+    for hidden in ("(default: )", "(default: None)", "{INT", "{none}"):
+        assert hidden not in " ".join(said.replace("│", "").split())
 
 
 def test_the_version_is_told(capsys) -> None:

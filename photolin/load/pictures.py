@@ -188,7 +188,10 @@ def _read_pnm(data: bytes, where: str) -> Picture:
 def _read_with_imageio(srgb: bool, why: str) -> Callable[[bytes, str], Picture]:
     def read(data: bytes, where: str) -> Picture:
         # Rotation tags are left aside: the pixels of a fixed camera are registered as stored.
-        rows, columns = iio.improps(BytesIO(data), plugin="pillow").shape[:2]
+        try:
+            rows, columns = iio.improps(BytesIO(data), plugin="pillow").shape[:2]
+        except Exception as error:  # imageio speaks of its plugins and of "uris"
+            raise ValueError("no readable header") from error
         check_size(rows, columns, where)
         plain = iio.immeta(BytesIO(data), plugin="pillow")["mode"] in ("L", "LA", "RGB", "RGBA")
         pixels = iio.imread(BytesIO(data), plugin="pillow", mode=None if plain else "RGB")
