@@ -130,6 +130,7 @@ def press(page: Any, *keys: str) -> None:
 def choose(page: Any, handle: Any, option: str) -> None:
     widget(page, handle).click()
     page.get_by_role("option", name=option, exact=True).click()
+    page.wait_for_function("document.activeElement === document.body")  # keys are for the picture
 
 
 def leave_widgets(page: Any) -> None:
