@@ -711,6 +711,8 @@ def test_a_first_run_that_is_cancelled_says_how_to_go_on(
 ) -> None:
     session = enter(page, open_app())
     wait_until(lambda: len(gate.began) == 1)
+    click_pixel(page, 30, 20)
+    wait_for_text(page, "There is no result by robust yet")
     press(page, "Escape")
     wait_for_text(page, "linearization cancelled; linearize again starts anew")
     assert session._results == {}

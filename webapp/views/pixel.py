@@ -66,6 +66,10 @@ class PixelView:
 
 
 def _invite(state: ViewState) -> str:
+    if state.pixel is not None:
+        return (
+            f"There is no result by {state.method} yet; it will say why this pixel is what it is."
+        )
     if state.beside is None:
         return "Click a pixel to see why it is labelled as it is."
     return f"Click a pixel to see why {state.method} and {state.beside} label it as they do."
