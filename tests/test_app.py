@@ -130,7 +130,12 @@ def press(page: Any, *keys: str) -> None:
 def choose(page: Any, handle: Any, option: str) -> None:
     widget(page, handle).click()
     page.get_by_role("option", name=option, exact=True).click()
-    page.wait_for_function("document.activeElement === document.body")  # keys are for the picture
+    wait_for_keys(page)
+
+
+def wait_for_keys(page: Any) -> None:
+    """Wait until no widget has the keys, a moment after a click."""
+    page.wait_for_function("document.activeElement === document.body")
 
 
 def leave_widgets(page: Any) -> None:
@@ -466,11 +471,12 @@ def test_keys_reach_the_picture_after_any_use_of_the_pointer(page: Any, app: App
         1,
     ):
         use()
-        page.wait_for_timeout(100)
+        wait_for_keys(page)
         press(page, "ArrowRight")
         wait_until(lambda count=count: view._image.value == count)
     wait_for_part(page, painted(RESULT.labels[7]), away_from(30))
     page.get_by_role("tab", name="Tune").click()
+    wait_for_keys(page)
     page.keyboard.down(" ")
     wait_for_part(page, np.repeat(picture(7)[..., None], 3, axis=2), away_from(30))
     page.keyboard.up(" ")
