@@ -156,9 +156,9 @@ def test_result_npz_holds_the_promised_arrays(analysis: Analysis, saved: Path) -
         "T": ("float64", ()),
         "Ts": ("float64", ()),
         "lights": ("float64", (K, 3)),
-        **{name: ("uint16", (H, W)) for name in ("lit", "diffuse", "margin")},
+        **dict.fromkeys(("lit", "diffuse", "margin"), ("uint16", (H, W))),
         "spread": ("float32", (H, W)),
-        **{name: ("float64", (K,)) for name in ("support", "residual", "gain", "saturated")},
+        **dict.fromkeys(("support", "residual", "gain", "saturated"), ("float64", (K,))),
     }
 
 

@@ -46,11 +46,12 @@ def describe_analysis(analysis: Analysis) -> dict[str, Any]:
             "name": name,
             "counts": {TITLES[factor]: int((row == factor).sum()) for factor in Factor},
             "support": float(fitting.mean()),
+            **describe_confidence(analysis, k),
         }
-        for name, row, fitting in zip(analysis.names, inside, supported, strict=True)
+        for k, (name, row, fitting) in enumerate(
+            zip(analysis.names, inside, supported, strict=True)
+        )
     ]
-    for k, image in enumerate(images):
-        image |= describe_confidence(analysis, k)
     return {
         "version": program_version(),
         "title": analysis.title,
