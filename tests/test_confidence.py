@@ -195,6 +195,18 @@ def test_lights_shuffled_altogether_are_said_not_to_belong(
     assert warning.endswith("may not belong to these images, or not in this order")
 
 
+@pytest.mark.parametrize("name", ["pot", "sphere_obstacles"])
+def test_images_that_are_cut_off_are_not_said_to_be_darker_than_possible(name: str) -> None:
+    stack, _ = scene(name, **NOISES[1])
+    top = np.float32(np.quantile(stack.images[:, stack.mask], 0.9))
+    cut = replace(stack, images=np.minimum(stack.images / top, np.float32(1)))
+    a = analyze(cut)
+    assert accused(a) == set()
+    assert certain(a).support.min() > 0.97
+    assert certain(a).saturated.mean() == pytest.approx(0.1, abs=0.01)
+    assert any(w.startswith("10 % of the observations are saturated") for w in a.warnings)
+
+
 # Pixels without light
 
 
