@@ -173,7 +173,7 @@ def test_another_exposure_is_named_where_light_powers_are_known(
 
 
 @pytest.mark.parametrize("noise", NOISES)
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["sphere_cone", "pot"])
 def test_two_lights_given_in_the_wrong_order_are_named(name: str, noise: dict[str, Any]) -> None:
     stack, lights = scene(name, **noise)
     lights[[3, 11]] = lights[[11, 3]]
@@ -193,6 +193,18 @@ def test_lights_shuffled_altogether_are_said_not_to_belong(
     assert warning.startswith(("only 1", "only 2"))
     assert "% of the lit observations agree" in warning
     assert warning.endswith("may not belong to these images, or not in this order")
+
+
+@pytest.mark.parametrize("name", ["pot", "sphere_obstacles"])
+def test_images_that_are_cut_off_are_not_said_to_be_darker_than_possible(name: str) -> None:
+    stack, _ = scene(name, **NOISES[1])
+    top = np.float32(np.quantile(stack.images[:, stack.mask], 0.9))
+    cut = replace(stack, images=np.minimum(stack.images / top, np.float32(1)))
+    a = analyze(cut)
+    assert accused(a) == set()
+    assert certain(a).support.min() > 0.97
+    assert certain(a).saturated.mean() == pytest.approx(0.1, abs=0.01)
+    assert any(w.startswith("10 % of the observations are saturated") for w in a.warnings)
 
 
 # Pixels without light
@@ -223,8 +235,8 @@ def test_many_pixels_lit_in_three_images_are_said_to_be_unchecked(
 # Two dimensions only
 
 
-@pytest.mark.parametrize("count", [8, 14, 24])
-@pytest.mark.parametrize("noise", [0.002, 0.005, 0.02])
+@pytest.mark.parametrize("count", [8, 24])
+@pytest.mark.parametrize("noise", [0.005, 0.02])
 @pytest.mark.parametrize("case", ["flat", "coplanar", "good"])
 def test_flat_scenes_and_lights_in_a_plane_are_refused_or_warned_whatever_the_noise(
     case: str, noise: float, count: int
@@ -242,7 +254,7 @@ def test_flat_scenes_and_lights_in_a_plane_are_refused_or_warned_whatever_the_no
     assert case == "good" or " % of its diffuse observations" in found[0]
 
 
-@pytest.mark.parametrize("noise", [0, 0.005, 0.02])
+@pytest.mark.parametrize("noise", [0, 0.02])
 @pytest.mark.parametrize("name", SCENES)
 def test_lights_in_a_plane_are_seen_through_highlights_and_shadows(
     name: str, noise: float, monkeypatch: pytest.MonkeyPatch
@@ -287,7 +299,7 @@ def test_narrow_lights_and_shallow_relief_without_noise_raise_no_doubt(
 # An ambient level
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["cup", "sphere_obstacles"])
 def test_an_ambient_level_is_warned_of_with_its_number_and_the_way_out(name: str) -> None:
     stack, _ = scene(name, ambient=0.02, noise=0.005)
     (warning,) = (w for w in analyze(stack).warnings if "not black" in w)

@@ -59,7 +59,7 @@ SHADOWS = Options(T=0.05, method="classification")
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize(("noise", "bits"), [(0, 16), (0.005, 16), (0.01, 8), (0.01, 16)])
+@pytest.mark.parametrize(("noise", "bits"), [(0, 16), (0.01, 8), (0.01, 16)])
 def test_an_ambient_level_is_measured(name: str, noise: float, bits: Bits) -> None:
     """Measured: within 0.6 bins, 1.3 where 8 bits are about as coarse as the bins."""
     stack = render_scene(name, size=(80, 100), ambient=0.02, noise=noise, bits=bits).stack
@@ -68,8 +68,7 @@ def test_an_ambient_level_is_measured(name: str, noise: float, bits: Bits) -> No
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("noise", [0, 0.002, 0.01, 0.02])
-@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize(("noise", "bits"), [(0, 8), (0.002, 8), (0.01, 8), (0.02, 16)])
 def test_black_shadows_have_no_ambient_level_even_with_noise_clipped_at_zero(
     name: str, noise: float, bits: Bits
 ) -> None:
