@@ -51,7 +51,7 @@ CONFIDENCE = {
     "gain": (np.float64, "K"),
     "saturated": (np.float64, "K"),
 }
-"""The same for `analysis.Confidence`: all are there, or none as in results of 0.1."""
+"""The same for `analysis.Confidence`: all are there, or none where it was not measured."""
 
 
 def save_result(
