@@ -13,6 +13,9 @@ from .consensus import stopping_table
 from .errors import DegenerateError
 from .factors import Thresholds
 from .kernels import centre_rows, consensus_rows, support_rows
+from .observations import Observations
+from .refit import refit_bases
+from .settle import settle_ties
 from .stack import ImageStack
 
 BLOCK = 4096
@@ -21,6 +24,8 @@ REACH = 4.0
 """Residual, in units of the noise, from which an observation has no weight in the last fit."""
 LEAST_REACH = 0.003
 """The least such residual, as a share of the brightest grays."""
+LEAST_NOISE = 6e-4
+"""The least noise, as a share of the brightest grays: rounding and faint light from elsewhere."""
 
 Work = Callable[[int, int, NDArray[np.float32], NDArray[np.int32]], None]
 
@@ -65,14 +70,64 @@ def linearize(
         DegenerateError: no three images determine a candidate.
         Cancelled: `cancel` said so.
     """
+    if options.method == "robust":
+        known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
+        return linearize_lit(
+            stack, coefficients, thresholds, options, known, threads, progress, cancel
+        )
+    work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
+    return fit_pixels(stack, work, threads, progress, cancel)
+
+
+def linearize_lit(
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    thresholds: Thresholds,
+    options: Options,
+    quality: Quality,
+    threads: int | None,
+    progress: Progress | None,
+    cancel: Cancel | None,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The method `robust`: consensus of each pixel by itself, then with its neighbours."""
+    # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
+    q, r = np.linalg.qr(coefficients)
+    scale = np.sqrt(len(q) / 3)
+    factors = np.ascontiguousarray((q * scale).T, np.float32)
+    X = stack.images.reshape(len(stack.images), -1)
+    few = stack.pixels[:: max(1, len(stack.pixels) // 1000)]
+    bright = max(float(np.quantile(X[:, few], 0.99)), float(np.finfo(np.float32).tiny))
+    reach = max(REACH * quality.noise, LEAST_REACH * bright)
+    work = consensus_work(stack, factors, thresholds, options, quality.white, reach)
+    bases, lead = fit_pixels(stack, work, threads, share(progress, 0, 0.4), cancel)
+    noise = quality.noise + LEAST_NOISE * bright
+    seen = Observations(
+        stack.images, stack.mask, factors, quality.white, thresholds.Ts, noise, bright
+    )
+    settled = settle_ties(seen, bases, lead, threads, cancel)
+    refitted = refit_bases(seen, settled, threads, share(progress, 0.4, 1), cancel)
+    back = (np.linalg.inv(r) * scale).astype(np.float32)
+    return np.tensordot(back, refitted, 1), lead
+
+
+def share(progress: Progress | None, start: float, stop: float) -> Progress | None:
+    """`progress` of a part of the stage that goes from `start` to `stop` of it."""
+    if progress is None:
+        return None
+    return lambda stage, fraction: progress(stage, start + fraction * (stop - start))
+
+
+def fit_pixels(
+    stack: ImageStack,
+    work: Work,
+    threads: int | None,
+    progress: Progress | None,
+    cancel: Cancel | None,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Bases (3,H,W) and margin (P,) of all mask pixels, a block at a time."""
     _, H, W = stack.shape
     bases = np.zeros((3, H * W), np.float32)
     margin = np.zeros(len(stack.pixels), np.int32)
-    if options.method == "robust":
-        known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
-        work = consensus_work(stack, coefficients, thresholds, options, known)
-    else:
-        work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
 
     def block(start: int, stop: int) -> None:
         out = np.full((stop - start, 3), np.nan, np.float32)
@@ -93,22 +148,16 @@ def linearize(
 
 def consensus_work(
     stack: ImageStack,
-    coefficients: NDArray[np.float64],
+    factors: NDArray[np.float32],
     thresholds: Thresholds,
     options: Options,
-    quality: Quality,
+    white: NDArray[np.float32],
+    reach: float,
 ) -> Work:
-    """Adaptive consensus on one block of pixels, in the frame where lights are well spread."""
+    """Adaptive consensus on one block of pixels, with factors (3,K)."""
     X = stack.images.reshape(len(stack.images), -1)
-    # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
-    q, r = np.linalg.qr(coefficients)
-    scale = np.sqrt(len(q) / 3)
-    A = np.ascontiguousarray((q * scale).T, np.float32)
-    back = (np.linalg.inv(r) * scale).T
     tries = stopping_table(options.samples)
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
-    bright = float(np.quantile(X[:, stack.pixels[:: max(1, len(stack.pixels) // 1000)]], 0.99))
-    reach = np.float32(max(REACH * quality.noise, LEAST_REACH * bright))
     seed, limit = np.uint64(options.seed), options.samples
 
     def work(start: int, stop: int, out: NDArray[np.float32], margin: NDArray[np.int32]) -> None:
@@ -117,11 +166,11 @@ def consensus_work(
         consensus_rows(
             X,
             pixels,
-            A,
-            quality.white,
+            factors,
+            white,
             T,
             Ts,
-            reach,
+            np.float32(reach),
             tries,
             limit,
             seed,
@@ -131,7 +180,6 @@ def consensus_work(
             0,
             len(pixels),
         )
-        out[:] = out @ back
 
     return work
 

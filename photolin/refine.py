@@ -24,10 +24,10 @@ from .factorize import (
 )
 from .sample import Sample
 
-WITHIN = 0.93
+WITHIN = 0.84
 """Share of the noise that the suggested T lets pass (1.8 standard deviations of a normal one). It
 trades diffuse pixels lost to noise against highlights lost to T, for the best mean of both."""
-MIN_T, MAX_T = 0.01, 0.12
+MIN_T, MAX_T = 0.016, 0.12
 FIRST_T = 0.1
 CUT = 3.0
 """Residual, in units of the noise, beyond which an observation is no longer diffuse in the fit."""
@@ -116,7 +116,11 @@ def measure_noise(
     l = coefficients.astype(np.float32) @ bases
     with np.errstate(invalid="ignore"):
         short = l - images
-        below = (images >= Ts) & (short > 0) & (short <= FIRST_T * images)
+        near = (images >= Ts) & (np.abs(short) <= FIRST_T * images)
+    # three unknowns take their share of the noise away, nearly all of it where few are lit
+    count = near.sum(axis=0)
+    short *= np.sqrt(count / np.maximum(count - 3, 0.5)).astype(np.float32)
+    below = near & (count > 3) & (short > 0)
     short, i = short[below], images[below]
     counted = short <= T * i
     if not counted.any():

@@ -22,10 +22,12 @@ from .sample import Sample
 FIRST_T = 0.05
 LEVELS = 256
 """Histogram bins from black to the brightest grays when looking for the shadow level."""
-FLOOR = 1
+FLOOR = 0.3
 """Bins that Ts spans where shadows are exactly dark: below, grazing light looks like them."""
 CEILING = 24
 """Bins that Ts spans at most: what falls off more slowly is a dark surface, not a shadow level."""
+SPREAD = 3.8
+"""Ts above the shadows' level, in standard deviations of the noise there."""
 GRAYS = slice(32, 96)
 """Bins whose level the dark mode has to rise from: beyond shadows, still dark."""
 SMOOTHING = np.array([1, 4, 6, 4, 1]) / 16
@@ -127,7 +129,7 @@ def dark_histogram(images: NDArray[np.float32]) -> tuple[NDArray[np.float64], fl
 
 def shorten(level: float) -> float:
     """Rounded to four decimals, or to two digits where that is finer, as on very dark stacks."""
-    return round(level, max(4, 1 - floor(log10(level)))) if level > 0 else 0.0
+    return float(round(level, max(4, 1 - floor(log10(level))))) if level > 0 else 0.0
 
 
 def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:
@@ -148,15 +150,28 @@ def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:
     return 0.0 if blacks > 0.2 * histogram[: 2 * peak + 1].sum() else peak + 0.5
 
 
-def shadow_bins(histogram: NDArray[np.float64]) -> int:
-    """How many bins of `dark_histogram` the shadows fill; FLOOR where they are exactly dark."""
+def shadow_bins(histogram: NDArray[np.float64]) -> float:
+    """How many bins of `dark_histogram` the shadows fill; FLOOR where they are exactly dark.
+
+    At least SPREAD standard deviations of the dark mode: where shadows are few, the tail of their
+    noise is lost among the grays.
+    """
     smooth = np.convolve(np.pad(histogram, 2, mode="edge"), SMOOTHING, mode="valid")
     grays = np.median(smooth[GRAYS])
     peak = int(np.argmax(smooth[:CEILING]))
     if smooth[peak] <= 2 * grays:
         return FLOOR
     above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
-    return peak + int(above[0]) + 1 if above.size else CEILING
+    if not above.size:
+        return CEILING
+    rise = smooth[peak:CEILING] - grays
+    ends = np.flatnonzero(rise <= 0)
+    # the area of half a normal distribution is 1.2533 deviations high; SMOOTHING adds one bin
+    area = rise[: ends[0] if ends.size else None].sum() / rise[0] - 0.5
+    deviation = np.sqrt(max((area / 1.2533) ** 2 - 1, 0.0))
+    # shadows with a level of their own stand out on both sides
+    spread = SPREAD * deviation if peak <= 2 else 0.0
+    return float(min(peak + max(above[0] + 1, spread), CEILING))
 
 
 @dataclass(frozen=True)

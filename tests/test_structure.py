@@ -15,10 +15,11 @@ import photolin
 ROOT = Path(__file__).parent.parent
 
 FLOORS = (
-    ("errors", "factors", "stack", "analysis", "compiling"),
+    ("errors", "factors", "stack", "analysis", "observations", "compiling"),
     ("kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
-    ("bases", "factorize", "refine", "coefficients", "linearize", "label", "thresholds"),
+    ("bases", "factorize", "refine", "coefficients", "settle", "refit"),
+    ("linearize", "label", "thresholds"),
     ("saturation", "near_light", "dimensions", "confidence"),
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),

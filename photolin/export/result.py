@@ -35,11 +35,15 @@ ARRAYS = {
     "base_images": (np.int64, "3"),
     "linearized_bases": (np.float32, "3HW"),
     "mask": (np.bool_, "HW"),
+    "determined": (np.bool_, "HW"),
     "T": (np.float64, ""),
     "Ts": (np.float64, ""),
     "lights": (np.float64, "K3"),
 }
-"""Type and axes of each array in result.npz; `lights` is there when the stack had them."""
+"""Type and axes of each array in result.npz. Bases are 0 where they are not `determined`, for
+readers that do not expect NaN; `load_result` puts it back."""
+OPTIONAL = {"lights", "determined"}
+"""Not there when the stack had no lights, and in results of earlier versions."""
 
 CONFIDENCE = {
     "lit": (np.uint16, "HW"),
@@ -117,12 +121,14 @@ def result_npz(analysis: Analysis) -> bytes:
 
     Numpy dates every entry 1980, so no clock enters the archive.
     """
+    determined = np.isfinite(analysis.linearized_bases).all(axis=0)
     arrays = {
         "labels": analysis.labels,
         "coefficients": analysis.coefficients,
         "base_images": analysis.base_images,
-        "linearized_bases": analysis.linearized_bases,
+        "linearized_bases": np.where(determined, analysis.linearized_bases, 0),
         "mask": analysis.mask,
+        "determined": determined & analysis.mask,
         "T": analysis.thresholds.T,
         "Ts": analysis.thresholds.Ts,
     }
@@ -156,13 +162,16 @@ def load_result(path: str | Path) -> Analysis:
         names = tuple(image["name"] for image in report["images"])
         if len(names) != len(arrays["labels"]) or "total" not in report["seconds"]:
             raise foreign(file.with_name(REPORT))
+        bases = arrays["linearized_bases"]
+        if "determined" in arrays:
+            bases[:, arrays["mask"] & ~arrays["determined"]] = np.nan
         known = {name: arrays[name] for name in CONFIDENCE if name in arrays}
         return Analysis(
             options=Options(**options),
             thresholds=Thresholds(float(arrays["T"]), float(arrays["Ts"])),
             base_images=(first, second, third),
             coefficients=arrays["coefficients"],
-            linearized_bases=arrays["linearized_bases"],
+            linearized_bases=bases,
             labels=arrays["labels"],
             mask=arrays["mask"],
             names=names,
@@ -246,7 +255,7 @@ def _read_arrays(file: Path) -> Mapping[str, NDArray]:
             arrays = {name: archive[name] for name in kinds if name in archive}
     except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise foreign(file) from error
-    if not set(ARRAYS) - {"lights"} <= set(arrays):
+    if not set(ARRAYS) - OPTIONAL <= set(arrays):
         raise foreign(file)
     if set(CONFIDENCE) & set(arrays) not in (set(), set(CONFIDENCE)):
         raise foreign(file)

@@ -1,0 +1,83 @@
+"""Ties among pixels that few observations decide: neighbours have nearly the same normal."""
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel
+from .blocks import run_blocks
+from .kernels import settle_rows, trust_rows
+from .observations import Observations
+
+BLOCK = 1 << 14
+FEW = 256
+SWEEPS = 4
+"""Most steps of one pixel by which a solution spreads."""
+CERTAIN = 0.03
+"""Uncertainty of a pixel's direction, radians, that halves what its neighbours make of it."""
+DOUBTFUL = 0.5
+"""Trust below which a pixel listens to its neighbours."""
+
+
+def settle_ties(
+    seen: Observations,
+    bases: NDArray[np.float32],
+    lead: NDArray[np.int32],
+    threads: int | None = None,
+    cancel: Cancel | None = None,
+) -> NDArray[np.float32]:
+    """Bases in which doubtful pixels may have taken a neighbour's direction.
+
+    Where a pixel is lit in few images, wrong solutions explain as many observations as the right
+    one. Of its own solution and those of its neighbours, rescaled and fitted again, the one wins
+    that costs least: squared residuals, cut off, plus the difference from the neighbours'
+    directions, each weighed by how well its own observations determine it. Doubtful are pixels
+    whose direction is uncertain or that won by one vote or none; all others stay as they are.
+
+    Args:
+        bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
+        lead: (P,) votes by which the solution of each mask pixel won.
+
+    Returns:
+        (3,H,W); does not depend on threads.
+
+    Raises:
+        Cancelled: `cancel` said so.
+    """
+    K, H, W = seen.images.shape
+    X, flat = seen.images.reshape(K, -1), bases.reshape(3, -1).copy()
+    pixels = np.flatnonzero(seen.mask)
+    known = (seen.factors, seen.white, np.float32(seen.Ts), np.float32(seen.noise))
+    trust = np.zeros(H * W, np.float32)
+
+    def weigh(start: int, stop: int) -> None:
+        trust_rows(X, pixels, *known, np.float32(CERTAIN), flat, lead, trust, start, stop)
+
+    run_blocks(weigh, len(pixels), BLOCK, threads=threads, cancel=cancel)
+    doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
+    for _ in range(SWEEPS):
+        out = np.empty((len(doubtful), 3), np.float32)
+        gained = np.empty(len(doubtful), np.float32)
+        work = partial(settle_rows, X, W, doubtful, *known, flat, trust, out, gained)
+        run_blocks(work, len(doubtful), FEW, threads=threads, cancel=cancel)
+        changed = gained >= 0
+        if not changed.any():
+            break
+        moved = doubtful[changed]
+        flat[:, moved] = out[changed].T
+        trust[moved] = np.maximum(trust[moved], gained[changed])
+        doubtful = doubtful[reached_by(moved, doubtful, (H, W))]
+    return flat.reshape(3, H, W)
+
+
+def reached_by(
+    moved: NDArray[np.intp], doubtful: NDArray[np.intp], shape: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Which doubtful pixels have a moved one in their window of 5 x 5; flat indices."""
+    near = np.zeros((shape[0] + 4, shape[1] + 4), bool)
+    rows, columns = np.divmod(moved, shape[1])
+    for i in range(5):
+        for j in range(5):
+            near[rows + i, columns + j] = True
+    return near[2:-2, 2:-2].reshape(-1)[doubtful]
