@@ -94,7 +94,7 @@ class Analysis:
     """(K,3): linearized image k is their combination of the linearized bases; rows of the base
     images are the unit vectors."""
     linearized_bases: NDArray[np.float32]
-    """(3,H,W) signed, fraction of full scale; 0 outside the mask."""
+    """(3,H,W) signed, fraction of full scale; 0 outside the mask, NaN where not determined."""
     labels: NDArray[np.uint8]
     """(K,H,W) Factor codes; OUTSIDE (255) outside the mask."""
     mask: NDArray[np.bool_]
@@ -126,8 +126,13 @@ class Analysis:
             if array is not None:
                 array.setflags(write=False)
 
+    def determined(self) -> NDArray[np.bool_]:
+        """(H,W) mask pixels that have linearized bases; others are lit in too few images."""
+        return self.mask & np.isfinite(self.linearized_bases).all(axis=0)
+
     def linearized(self, k: int) -> NDArray[np.float32]:
-        """Linearized image k: (H,W) float32, signed, fraction of full scale; 0 outside the mask."""
+        """Linearized image k: (H,W) float32, signed, fraction of full scale; 0 outside the mask,
+        NaN where not determined."""
         c = self.coefficients[k].astype(np.float32)
         b = self.linearized_bases
         return c[0] * b[0] + c[1] * b[1] + c[2] * b[2]

@@ -121,15 +121,14 @@ def measure_noise(
     count = near.sum(axis=0)
     short *= np.sqrt(count / np.maximum(count - 3, 0.5)).astype(np.float32)
     below = near & (count > 3) & (short > 0)
-    short, i = short[below], images[below]
+    short, i, level = short[below], images[below], l[below]
     counted = short <= T * i
     if not counted.any():
         return NO_NOISE
     tail = float(np.quantile(short / i, WITHIN))
-    short, i = short[counted], i[counted]
+    short, i, level = short[counted], i[counted], level[counted]
     # T i cuts off the noise of dim observations, but not that of bright ones; bright by the fit:
     # among equally lit pixels the brighter observations are those with less noise below it
-    level = i + short
     bright = level >= np.median(level)
     return Noise(half_normal(short / i), half_normal(short[bright]), tail)
 

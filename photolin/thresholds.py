@@ -22,8 +22,10 @@ from .sample import Sample
 FIRST_T = 0.05
 LEVELS = 256
 """Histogram bins from black to the brightest grays when looking for the shadow level."""
-FLOOR = 0.3
-"""Bins that Ts spans where shadows are exactly dark: below, grazing light looks like them."""
+FLOOR = 1.0
+"""Bins that Ts spans where no shadow level is seen: below, grazing light looks like shadows."""
+BLACK, BLACK_FLOOR = 0.01, 0.3
+"""Share of observations that are exactly 0 from which shadows are black, and the bins then."""
 CEILING = 24
 """Bins that Ts spans at most: what falls off more slowly is a dark surface, not a shadow level."""
 SPREAD = 3.8
@@ -69,7 +71,9 @@ def suggest_thresholds(
         DegenerateError: the images do not determine coefficients.
     """
     histogram, bin_width = dark_histogram(sample.images)
-    Ts = options.Ts if options.Ts is not None else shorten(bin_width * shadow_bins(histogram))
+    blacks = int((sample.images <= 0).sum())
+    bins = shadow_bins(histogram, blacks / sample.images.size)
+    Ts = options.Ts if options.Ts is not None else shorten(bin_width * bins)
     starts = find_starts(sample, Ts, options, lights)
     T, found = options.T, None
     if T is None or options.method == "robust":
@@ -77,7 +81,7 @@ def suggest_thresholds(
     if T is None:
         assert found is not None
         T = round(follow_noise(found.noise), 4)
-    offset = bin_width * offset_bins(histogram, int((sample.images <= 0).sum()))
+    offset = bin_width * offset_bins(histogram, blacks)
     return Suggestion(Thresholds(T, Ts), histogram, bin_width, offset, tuple(starts), found)
 
 
@@ -150,17 +154,20 @@ def offset_bins(histogram: NDArray[np.float64], blacks: int) -> float:
     return 0.0 if blacks > 0.2 * histogram[: 2 * peak + 1].sum() else peak + 0.5
 
 
-def shadow_bins(histogram: NDArray[np.float64]) -> float:
-    """How many bins of `dark_histogram` the shadows fill; FLOOR where they are exactly dark.
+def shadow_bins(histogram: NDArray[np.float64], black: float = 0.0) -> float:
+    """How many bins of `dark_histogram` the shadows fill; FLOOR or BLACK_FLOOR where none is seen.
 
     At least SPREAD standard deviations of the dark mode: where shadows are few, the tail of their
     noise is lost among the grays.
+
+    Args:
+        black: share of the observations that are exactly 0, which the histogram leaves out.
     """
     smooth = np.convolve(np.pad(histogram, 2, mode="edge"), SMOOTHING, mode="valid")
     grays = np.median(smooth[GRAYS])
     peak = int(np.argmax(smooth[:CEILING]))
     if smooth[peak] <= 2 * grays:
-        return FLOOR
+        return BLACK_FLOOR if black > BLACK else FLOOR
     above = np.flatnonzero(smooth[peak:CEILING] <= 1.25 * grays)
     if not above.size:
         return CEILING

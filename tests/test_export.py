@@ -157,6 +157,7 @@ def test_result_npz_holds_the_promised_arrays(analysis: Analysis, saved: Path) -
         "base_images": ("int64", (3,)),
         "linearized_bases": ("float32", (3, H, W)),
         "mask": ("bool", (H, W)),
+        "determined": ("bool", (H, W)),
         "T": ("float64", ()),
         "Ts": ("float64", ()),
         "lights": ("float64", (K, 3)),

@@ -97,30 +97,51 @@ def test_the_tolerance_is_the_tail_of_the_noise_within_bounds() -> None:
     assert follow_noise(Noise(0.01, 0.01, 1)) == MAX_T
 
 
+def read_noise(i: np.ndarray, l: np.ndarray, T: float) -> Noise:
+    """Noise of observations (40,M) of a fit l, which has one light for all."""
+    bases = np.concatenate([l[:1], np.zeros((2, l.shape[1]))]).astype(np.float32)
+    return measure_noise(i.astype(np.float32), np.tile([1.0, 0, 0], (40, 1)), bases, T, 0.02)
+
+
 def test_noise_is_read_below_the_fit_only_and_from_lit_pixels() -> None:
     rng = np.random.default_rng(0)
-    l = np.full((1, 100_000), 0.5)
+    l = np.full((40, 2500), 0.5)
     i = l * (1 + rng.normal(0, 0.01, l.shape))
-    i[:, :40_000] += 0.2  # highlights
-    i[:, 40_000:50_000] = 0.001  # shadows
-    bases = np.concatenate([l, np.zeros((2, l.size))]).astype(np.float32)
-    noise = measure_noise(i.astype(np.float32), np.array([[1.0, 0, 0]]), bases, 0.1, 0.02)
-    assert noise.relative == pytest.approx(0.01, rel=0.03)
-    assert noise.absolute == pytest.approx(0.005, rel=0.03)
-    tail = 0.01 * NormalDist().inv_cdf(0.5 + WITHIN / 2)
+    i[:16] += 0.2  # highlights
+    i[16:20] = 0.001  # shadows
+    noise = read_noise(i, l, 0.1)
+    taken = np.sqrt(20 / 17)  # twenty near the fit, which has three unknowns
+    assert noise.relative == pytest.approx(0.01 * taken, rel=0.03)
+    assert noise.absolute == pytest.approx(0.005 * taken, rel=0.03)
+    tail = 0.01 * taken * NormalDist().inv_cdf(0.5 + WITHIN / 2)
     assert noise.tail == pytest.approx(tail, rel=0.03)
+
+
+@pytest.mark.parametrize("lit", [4, 6, 20])
+def test_noise_is_read_right_however_few_images_a_pixel_is_lit_in(lit: int) -> None:
+    """Residuals of a fit to four observations are half the noise."""
+    rng = np.random.default_rng(0)
+    c = rng.normal((0, 0, 4), 1, (lit, 3))
+    l = c @ rng.uniform(0.05, 0.1, (3, 20_000))
+    i = (l + rng.normal(0, 0.002, l.shape)).astype(np.float32)
+    noise = measure_noise(i, c, np.linalg.lstsq(c, i)[0].astype(np.float32), 0.1, 0.02)
+    assert noise.absolute == pytest.approx(0.002, rel=0.2)
+
+
+def test_pixels_that_fit_whatever_they_are_tell_no_noise() -> None:
+    l = np.full((3, 50), 0.5, np.float32)
+    bases = np.concatenate([l[:1] + 0.01, np.zeros((2, 50), np.float32)])
+    assert measure_noise(l, np.tile([1.0, 0, 0], (3, 1)), bases, 0.1, 0.02) == NO_NOISE
 
 
 def test_noise_of_one_size_is_read_from_the_bright_and_its_tail_beyond_the_tolerance() -> None:
     """T i cuts off the noise of dim observations, so that they would show too little of it."""
     rng = np.random.default_rng(0)
-    l = np.concatenate([np.full(50_000, 0.1), np.full(50_000, 0.8)])[None]
-    i = (l + rng.normal(0, 0.01, l.shape)).astype(np.float32)
-    bases = np.concatenate([l, np.zeros((2, l.size))]).astype(np.float32)
-    noise = measure_noise(i, np.array([[1.0, 0, 0]]), bases, 0.04, 0.02)
-    assert noise.absolute == pytest.approx(0.01, rel=0.05)
+    l = np.tile(np.concatenate([np.full(1250, 0.1), np.full(1250, 0.8)]), (40, 1))
+    noise = read_noise(l + rng.normal(0, 0.01, l.shape), l, 0.04)
+    assert noise.absolute == pytest.approx(0.01 * np.sqrt(40 / 37), rel=0.05)
     assert noise.relative < 0.02
-    assert noise.tail > 0.07
+    assert noise.tail > 0.05
 
 
 def test_where_nothing_is_below_the_fit_there_is_no_noise() -> None:

@@ -80,6 +80,7 @@ def describe_analysis(analysis: Analysis) -> dict[str, Any]:
         "notes": list(analysis.notes),
         "warnings": list(analysis.warnings),
         "images": images,
+        "undetermined": int((analysis.mask & ~analysis.determined()).sum()),
         "support": {
             "pixels": int(per_pixel.size),
             "mean": float(per_pixel.mean()),

@@ -121,14 +121,14 @@ def result_npz(analysis: Analysis) -> bytes:
 
     Numpy dates every entry 1980, so no clock enters the archive.
     """
-    determined = np.isfinite(analysis.linearized_bases).all(axis=0)
+    known = analysis.determined()
     arrays = {
         "labels": analysis.labels,
         "coefficients": analysis.coefficients,
         "base_images": analysis.base_images,
-        "linearized_bases": np.where(determined, analysis.linearized_bases, 0),
+        "linearized_bases": np.where(known, analysis.linearized_bases, 0),
         "mask": analysis.mask,
-        "determined": determined & analysis.mask,
+        "determined": known,
         "T": analysis.thresholds.T,
         "Ts": analysis.thresholds.Ts,
     }

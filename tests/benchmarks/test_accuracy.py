@@ -6,6 +6,7 @@ The second table switches one ingredient off at a time.
 """
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +26,17 @@ from photolin import (
 )
 from photolin.analysis import Options
 from photolin.evaluate import evaluate, light_error
+from photolin.factors import Thresholds, classify
 from photolin.synthetic import SCENES, Truth
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 SEEDS = range(5)
 NOISY = {"noise": 0.01, "bits": 8, "seed": 1}
+RAY_TRACED = {
+    "pov_sphere_cone": {"macro": 99.5, "ratio": 0.95, "light": 0.02},
+    "pov_sphere_obstacles": {"macro": 98.8, "p99": 0.004, "light": 0.02},
+}
+"""Stacks beside the checkout, and what they have to reach."""
 
 
 def measure(stack: ImageStack, truth: Truth, seeds: range = SEEDS) -> dict[str, float]:
@@ -37,7 +44,9 @@ def measure(stack: ImageStack, truth: Truth, seeds: range = SEEDS) -> dict[str, 
     runs = []
     for seed in seeds:
         a = analyze(stack, Options(seed=seed))
-        runs.append(evaluate(a.labels, a.coefficients, a.linearized_bases, truth, stack.images))
+        # undetermined pixels count as what result.npz holds of them: 0
+        bases = np.nan_to_num(a.linearized_bases)
+        runs.append(evaluate(a.labels, a.coefficients, bases, truth, stack.images))
     return {
         "macro": min(e.macro for e in runs),
         "ratio": max(e.oracle_ratio for e in runs),
@@ -58,30 +67,87 @@ def test_noise_free_scenes(name: str) -> None:
     print(row(name, figures))
     assert figures["light"] <= 0.02
     assert figures["macro"] >= 97.5
+    if name == "sphere_cone":
+        a = analyze(scene.stack)
+        e = evaluate(a.labels, a.coefficients, a.linearized_bases, scene.truth)
+        print(row("C, A, D, S", dict(zip("CADS", e.confusion.diagonal(), strict=True))))
+        assert (e.confusion.diagonal() >= (99.9, 99.9, 99.5, 99)).all()
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_with_one_percent_noise_in_8_bits(name: str) -> None:
     scene = render_scene(name, **NOISY)
     figures = measure(scene.stack, scene.truth)
-    print(row(f"{name}, 8 bit, 1 % noise", figures))
+    limit = best_on_grid(scene.stack.images, scene.truth.ideal, scene.truth, GRID_T, GRID_TS)
+    print(row(f"{name}, 8 bit, 1 % noise", figures | {"perfect images": limit}))
     assert figures["light"] <= 0.15
     assert figures["ratio"] <= 1.5
+    assert figures["macro"] >= limit - 3
+    if figures["macro"] < 90:
+        pytest.xfail(f"90 is the bar; perfect linearized images give {limit:.2f} at best")
 
 
-@pytest.mark.parametrize(
-    ("name", "bars"),
-    [
-        ("pov_sphere_cone", {"macro": 99.5, "ratio": 0.95, "light": 0.02}),
-        ("pov_sphere_obstacles", {"macro": 98.8, "p99": 0.004, "light": 0.02}),
-    ],
-)
-def test_ray_traced_scenes(name: str, bars: dict[str, float]) -> None:
+GRID_T = np.geomspace(0.005, 0.2, 30)
+GRID_TS = np.geomspace(0.001, 0.1, 30)
+
+
+def macro_accuracy(i: np.ndarray, l: np.ndarray, truth: Truth, T: float, Ts: float) -> float:
+    """Percent of the true classes labelled right, for observations i (K,P) and a fit l (K,P)."""
+    labels, true = classify(i, l, Thresholds(T, Ts)), truth.labels[:, truth.mask]
+    return float(np.mean([100 * (labels[true == f] == f).mean() for f in (1, 2, 3, 4)]))
+
+
+def best_on_grid(
+    images: np.ndarray,
+    linearized: np.ndarray,
+    truth: Truth,
+    tolerances: np.ndarray,
+    levels: np.ndarray,
+) -> float:
+    """Best macro accuracy of any T and Ts of a grid, for images and a fit (K,H,W)."""
+    i, l = images[:, truth.mask], linearized[:, truth.mask]
+    return max(macro_accuracy(i, l, truth, T, Ts) for T in tolerances for Ts in levels)
+
+
+def labelled_stacks() -> dict[str, Callable[[], tuple[ImageStack, Truth]]]:
+    """Every stack with known labels, clean and noisy, by name."""
+
+    def rendered(name: str, options: dict) -> tuple[ImageStack, Truth]:
+        scene = render_scene(name, **options)
+        return scene.stack, scene.truth
+
+    def ray_traced(name: str) -> tuple[ImageStack, Truth]:
+        return load_stack(SHARED / name), load_truth(SHARED / name)
+
+    return (
+        {name: partial(rendered, name, {}) for name in SCENES}
+        | {f"{name}, noise": partial(rendered, name, NOISY) for name in SCENES}
+        | {name: partial(ray_traced, name) for name in RAY_TRACED if (SHARED / name).is_dir()}
+    )
+
+
+@pytest.mark.parametrize("name", labelled_stacks())
+def test_suggested_thresholds_come_near_the_best_of_a_grid(name: str) -> None:
+    """Of 30 x 30 T and Ts: all of them for the labels alone, every sixth in T and Ts for a whole
+    run with them."""
+    stack, truth = labelled_stacks()[name]()
+    a = analyze(stack)
+    i, own = stack.images[:, truth.mask], np.stack([a.linearized(k) for k in range(len(a.names))])
+    got = macro_accuracy(i, own[:, truth.mask], truth, a.thresholds.T, a.thresholds.Ts)
+    relabelled = best_on_grid(stack.images, own, truth, GRID_T, GRID_TS)
+    runs = [analyze(stack, Options(T=T, Ts=Ts)) for T in GRID_T[2::6] for Ts in GRID_TS[2::6]]
+    again = max(evaluate(r.labels, r.coefficients, r.linearized_bases, truth).macro for r in runs)
+    print(row(name, {"suggested": got, "best labels": relabelled, "best run": again}))
+    assert got >= max(relabelled, again) - 1.5
+
+
+@pytest.mark.parametrize("name", RAY_TRACED)
+def test_ray_traced_scenes(name: str) -> None:
     if not (SHARED / name).is_dir():
         pytest.skip(f"{name} is not beside this checkout")
     figures = measure(load_stack(SHARED / name), load_truth(SHARED / name))
     print(row(name, figures))
-    for key, bar in bars.items():
+    for key, bar in RAY_TRACED[name].items():
         assert figures[key] >= bar if key == "macro" else figures[key] <= bar
 
 
@@ -111,7 +177,13 @@ INGREDIENTS: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
         patch.setattr(refine, "EARLY", 0),
     )[0],
     "no annealing": lambda patch: patch.setattr(refine, "FIRST_WIDTH", refine.LAST_WIDTH),
-    "no weighted last fit": lambda patch: (
+    "no settling by neighbours": lambda patch: patch.setattr(
+        linearize, "settle_ties", lambda seen, bases, *rest: bases
+    ),
+    "no refit without shared highlights": lambda patch: patch.setattr(
+        linearize, "refit_bases", lambda seen, bases, *rest: bases
+    ),
+    "no weighted first fit": lambda patch: (
         patch.setattr(linearize, "REACH", 0.0),
         patch.setattr(linearize, "LEAST_REACH", 0.0),
     )[0],
