@@ -36,7 +36,11 @@ LAST_WIDTH = 5e-4
 """Below this, residuals of noise-free 16-bit images are rounding."""
 ROUNDS = 12
 EARLY = 4
-"""Rounds on a part of the sample: far from the noise, more pixels tell no more."""
+"""Rounds on the smallest part of the sample: far from the noise, more pixels tell no more."""
+MORE_PIXELS = 4000
+"""Pixels from then on, until the coefficients are still."""
+LATE = 2
+"""Rounds on the whole sample, if they are not still before."""
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
 DAMPING = 1e-6
@@ -68,9 +72,12 @@ def refine_coefficients(
     before = c = orthogonalize(coefficients)
     noise = Noise(FIRST_T / CUT, 0.0, FIRST_T)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
-    few = sample.thin(ROUGH_PIXELS)
+    some, more = sample.thin(ROUGH_PIXELS), sample.thin(MORE_PIXELS)
     for round_ in range(ROUNDS):
-        some = few if round_ < EARLY else sample
+        if round_ == EARLY:
+            some = more
+        if round_ >= ROUNDS - LATE:
+            some = sample
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
         wanted = max(CUT * noise.relative, MIN_T) if T is None else T
@@ -86,9 +93,11 @@ def refine_coefficients(
             raise DegenerateError(NO_START)
         c = orthogonalize(c)
         # annealing goes on while it still changes the width, however little the coefficients move
-        still = some is sample and change_of_span(before, c) < STILL
+        still = round_ >= EARLY and change_of_span(before, c) < STILL
         if still and width <= max(2 * noise.relative, LAST_WIDTH):
-            break
+            if some is sample:
+                break
+            some = sample
     # the last step has turned the frame that the bases are in, the more the less is determined
     bases = (np.linalg.lstsq(c, before)[0] @ bases).astype(np.float32)
     return Factorization(c, bases, int(score[score > 0].sum()), noise)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .stack import ImageStack
 
-SAMPLE_PIXELS = 4000
+SAMPLE_PIXELS = 8000
 
 
 @dataclass(frozen=True, eq=False)
