@@ -84,7 +84,7 @@ def test_scenes_with_one_percent_noise_in_8_bits(name: str) -> None:
     assert figures["ratio"] <= 1.5
     assert figures["macro"] >= limit - 3
     if figures["macro"] < 90:
-        pytest.xfail(f"90 is the bar; perfect linearized images give {limit:.2f} at best")
+        pytest.xfail(row(f"the bar is 90; {name}", figures | {"perfect images": limit}))
 
 
 GRID_T = np.geomspace(0.005, 0.2, 30)
