@@ -7,7 +7,8 @@ from .blocks import run_blocks
 from .factors import Thresholds
 from .kernels import label_rows
 
-BLOCK = 1 << 17
+BLOCK = 1 << 14
+"""Pixels whose bases stay in the cache while all images are labelled."""
 
 
 def label_images(
@@ -35,14 +36,11 @@ def label_images(
     c = coefficients.astype(np.float32)
     labels = np.empty(flat.shape, np.uint8)
     count = flat.shape[1]
-    blocks = -(-count // BLOCK)
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
 
     def work(start: int, stop: int) -> None:
-        for job in range(start, stop):
-            k, first = job // blocks, job % blocks * BLOCK
-            last = min(first + BLOCK, count)
-            label_rows(flat[k], bases, c[k], mask.reshape(-1), T, Ts, labels[k], first, last)
+        for k in range(len(flat)):
+            label_rows(flat[k], bases, c[k], mask.reshape(-1), T, Ts, labels[k], start, stop)
 
-    run_blocks(work, len(flat) * blocks, max(1, blocks), threads=threads)
+    run_blocks(work, count, BLOCK, threads=threads)
     return labels.reshape(images.shape)

@@ -1,7 +1,6 @@
 """Step 2: linearized bases of every pixel, (l1, l2, l3) by Eq. (6)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,35 +8,15 @@ from numpy.typing import NDArray
 from .analysis import Cancel, Options, Progress
 from .blocks import run_blocks
 from .coefficients import KEEP, draw_samples
-from .consensus import stopping_table
 from .errors import DegenerateError
 from .factors import Thresholds
-from .kernels import centre_rows, consensus_rows, support_rows
-from .observations import Observations
-from .refit import refit_bases
-from .settle import settle_ties
+from .kernels import centre_rows, support_rows
+from .robust import Quality, Talk, linearize_robustly
 from .stack import ImageStack
 
 BLOCK = 4096
 
-REACH = 4.0
-"""Residual, in units of the noise, from which an observation has no weight in the last fit."""
-LEAST_REACH = 0.003
-"""The least such residual, as a share of the brightest grays."""
-LEAST_NOISE = 6e-4
-"""The least noise, as a share of the brightest grays: rounding and faint light from elsewhere."""
-
 Work = Callable[[int, int, NDArray[np.float32], NDArray[np.int32]], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Quality:
-    """What is known of a stack's observations."""
-
-    white: NDArray[np.float32]
-    """(K,) value from which observations of an image are saturated; infinity for none."""
-    noise: float
-    """Standard deviation of an observation, fraction of full scale."""
 
 
 def linearize(
@@ -72,49 +51,11 @@ def linearize(
     """
     if options.method == "robust":
         known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
-        return linearize_lit(
-            stack, coefficients, thresholds, options, known, threads, progress, cancel
-        )
+        talk = Talk(threads, progress, cancel)
+        T, Ts = thresholds.T, thresholds.Ts
+        return linearize_robustly(stack, coefficients, T, Ts, options, known, talk)
     work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
     return fit_pixels(stack, work, threads, progress, cancel)
-
-
-def linearize_lit(
-    stack: ImageStack,
-    coefficients: NDArray[np.float64],
-    thresholds: Thresholds,
-    options: Options,
-    quality: Quality,
-    threads: int | None,
-    progress: Progress | None,
-    cancel: Cancel | None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """The method `robust`: consensus of each pixel by itself, then with its neighbours."""
-    # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
-    q, r = np.linalg.qr(coefficients)
-    scale = np.sqrt(len(q) / 3)
-    factors = np.ascontiguousarray((q * scale).T, np.float32)
-    X = stack.images.reshape(len(stack.images), -1)
-    few = stack.pixels[:: max(1, len(stack.pixels) // 1000)]
-    bright = max(float(np.quantile(X[:, few], 0.99)), float(np.finfo(np.float32).tiny))
-    reach = max(REACH * quality.noise, LEAST_REACH * bright)
-    work = consensus_work(stack, factors, thresholds, options, quality.white, reach)
-    bases, lead = fit_pixels(stack, work, threads, share(progress, 0, 0.4), cancel)
-    noise = quality.noise + LEAST_NOISE * bright
-    seen = Observations(
-        stack.images, stack.mask, factors, quality.white, thresholds.Ts, noise, bright
-    )
-    settled = settle_ties(seen, bases, lead, threads, cancel)
-    refitted = refit_bases(seen, settled, threads, share(progress, 0.4, 1), cancel)
-    back = (np.linalg.inv(r) * scale).astype(np.float32)
-    return np.tensordot(back, refitted, 1), lead
-
-
-def share(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """`progress` of a part of the stage that goes from `start` to `stop` of it."""
-    if progress is None:
-        return None
-    return lambda stage, fraction: progress(stage, start + fraction * (stop - start))
 
 
 def fit_pixels(
@@ -144,44 +85,6 @@ def fit_pixels(
         cancel=cancel,
     )
     return bases.reshape(3, H, W), margin
-
-
-def consensus_work(
-    stack: ImageStack,
-    factors: NDArray[np.float32],
-    thresholds: Thresholds,
-    options: Options,
-    white: NDArray[np.float32],
-    reach: float,
-) -> Work:
-    """Adaptive consensus on one block of pixels, with factors (3,K)."""
-    X = stack.images.reshape(len(stack.images), -1)
-    tries = stopping_table(options.samples)
-    T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
-    seed, limit = np.uint64(options.seed), options.samples
-
-    def work(start: int, stop: int, out: NDArray[np.float32], margin: NDArray[np.int32]) -> None:
-        pixels = stack.pixels[start:stop]
-        score = np.empty(len(pixels), np.int32)
-        consensus_rows(
-            X,
-            pixels,
-            factors,
-            white,
-            T,
-            Ts,
-            np.float32(reach),
-            tries,
-            limit,
-            seed,
-            out,
-            score,
-            margin,
-            0,
-            len(pixels),
-        )
-
-    return work
 
 
 def shared_samples_work(

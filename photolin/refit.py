@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .analysis import Cancel, Progress
 from .blocks import run_blocks
-from .kernels import pooled_tile
+from .kernels import clear_tile, pooled_tile
 from .observations import Observations
 
 TILE = 32
@@ -78,7 +78,7 @@ def refit_bases(
     new = old.copy()
     tiles = {at: t for at, t in split(seen.mask.shape).items() if usable[t].any()}
     least = STILL * seen.noise / seen.bright
-    cap = max(CAP * seen.bright, BELOW * seen.noise)
+    cap = widest(seen)
     slack, reach = BELOW * seen.noise + SLACK * seen.bright, 0.0
     for round_ in range(ROUNDS):
         if round_ <= len(ANNEAL):
@@ -96,6 +96,43 @@ def refit_bases(
             moved = surround({at for at, c in zip(tiles, change, strict=True) if c > least})
             tiles = {at: tile for at, tile in tiles.items() if at in moved}
     return np.where(usable, old, bases)
+
+
+def find_clear(
+    seen: Observations,
+    bases: NDArray[np.float32],
+    threads: int | None = None,
+    cancel: Cancel | None = None,
+) -> NDArray[np.float32]:
+    """(K,H,W) how free of highlights the surroundings of each pixel are in each image, 0 to 1.
+
+    Args:
+        bases: (3,H,W) of `refit_bases`.
+
+    Raises:
+        Cancelled: `cancel` said so.
+    """
+    usable = seen.mask & np.isfinite(bases[0])
+    flat = np.where(usable, bases, np.float32(0))
+    cap = widest(seen)
+    reach = REACH * (measure_means(seen, usable, cap, flat) + LEAST * seen.bright)
+    clear = np.ones(seen.images.shape, np.float32)
+    tiles = list(split(seen.mask.shape).values())
+    known = (seen.images, usable, seen.factors, seen.white, np.float32(seen.Ts), flat)
+
+    def work(start: int, stop: int) -> None:
+        for rows, columns in tiles[start:stop]:
+            size = (rows.stop - rows.start, columns.stop - columns.start)
+            place = (rows.start, columns.start)
+            clear_tile(*known, np.float32(cap), np.float32(reach), *place, *size, clear)
+
+    run_blocks(work, len(tiles), 4, threads=threads, cancel=cancel)
+    return clear
+
+
+def widest(seen: Observations) -> float:
+    """Residual beyond which one observation is out by itself, fraction of full scale."""
+    return max(CAP * seen.bright, BELOW * seen.noise)
 
 
 def fit_tiles(

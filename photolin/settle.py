@@ -26,6 +26,7 @@ def settle_ties(
     lead: NDArray[np.int32],
     threads: int | None = None,
     cancel: Cancel | None = None,
+    among: NDArray[np.intp] | None = None,
 ) -> NDArray[np.float32]:
     """Bases in which doubtful pixels may have taken a neighbour's direction.
 
@@ -37,7 +38,8 @@ def settle_ties(
 
     Args:
         bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
-        lead: (P,) votes by which the solution of each mask pixel won.
+        lead: (P,) votes by which the solution of each mask pixel, or of `among`, won.
+        among: flat indices of the pixels that may be doubtful; all of the mask when left out.
 
     Returns:
         (3,H,W); does not depend on threads.
@@ -47,9 +49,9 @@ def settle_ties(
     """
     K, H, W = seen.images.shape
     X, flat = seen.images.reshape(K, -1), bases.reshape(3, -1).copy()
-    pixels = np.flatnonzero(seen.mask)
+    pixels = np.flatnonzero(seen.mask) if among is None else among
     known = (seen.factors, seen.white, np.float32(seen.Ts), np.float32(seen.noise))
-    trust = np.zeros(H * W, np.float32)
+    trust = (seen.mask & np.isfinite(bases[0])).reshape(-1).astype(np.float32)
 
     def weigh(start: int, stop: int) -> None:
         trust_rows(X, pixels, *known, np.float32(CERTAIN), flat, lead, trust, start, stop)

@@ -21,15 +21,18 @@ choose_cache(Path(__file__).parent)
 
 from .consensus import consensus_rows  # noqa: E402
 from .evidence import evidence_rows  # noqa: E402
+from .fine import fine_band  # noqa: E402
 from .labels import label_rows  # noqa: E402
 from .neighbours import settle_rows, trust_rows  # noqa: E402
-from .pooled import pooled_tile  # noqa: E402
+from .pooled import clear_tile, pooled_tile  # noqa: E402
 from .samples import centre_rows, support_rows  # noqa: E402
 
 __all__ = [
     "centre_rows",
+    "clear_tile",
     "consensus_rows",
     "evidence_rows",
+    "fine_band",
     "label_rows",
     "pooled_tile",
     "settle_rows",

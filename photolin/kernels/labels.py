@@ -16,21 +16,22 @@ def label_rows(image, bases, c, mask, T, Ts, labels, start, stop):  # pragma: no
         T, Ts: float32 thresholds.
         labels: (N,) uint8, written.
     """
-    for p in range(start, stop):
-        i = image[p]
-        l = c[0] * bases[0, p] + c[1] * bases[1, p] + c[2] * bases[2, p]
+    # slices indexed from 0 become vector instructions, start + p does not
+    x, inside, out = image[start:stop], mask[start:stop], labels[start:stop]
+    b0, b1, b2 = bases[0, start:stop], bases[1, start:stop], bases[2, start:stop]
+    c0, c1, c2 = c[0], c[1], c[2]
+    for p in range(len(out)):
+        i = x[p]
+        l = c0 * b0[p] + c1 * b1[p] + c2 * b2[p]
         excess = i - l
         slack = T * i
         lit = i >= Ts
+        dark = i < Ts
         diffuse = lit & (abs(excess) <= slack)
         specular = lit & (excess > slack) & (l >= 0)
-        attached = (i < Ts) & (l <= 0)
-        cast = (i < Ts) & (l > 0)
-        # the four exclude each other, so their codes add up; no branch, so the loop vectorizes
-        code = (
-            np.uint8(diffuse)
-            + np.uint8(2) * np.uint8(specular)
-            + np.uint8(3) * np.uint8(attached)
-            + np.uint8(4) * np.uint8(cast)
-        )
-        labels[p] = code if mask[p] else np.uint8(255)
+        attached = dark & (l <= 0)
+        cast = dark & (l > 0)
+        # the four exclude each other, so their codes add up without a branch
+        code = np.int32(diffuse) + 2 * np.int32(specular) + 3 * np.int32(attached)
+        code += 4 * np.int32(cast)
+        out[p] = np.uint8(code) if inside[p] else np.uint8(255)

@@ -63,6 +63,39 @@ def _add(total, u, a):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
+def _look_around(
+    images, usable, A, white, Ts, bases, cap, top, left, k, near, lit, across, among
+):  # pragma: no cover
+    """Residuals of image k in a tile and two pixels around it, and their sums over five columns;
+    whether anything is lit. All arrays are 0 beyond the picture."""
+    _, height, width = images.shape
+    high, wide = near.shape
+    above, below = max(0, HALF - top), min(high, height + HALF - top)
+    before, after = max(0, HALF - left), min(wide, width + HALF - left)
+    span = slice(left - HALF + before, left - HALF + after)
+    c = A[:, k].copy()
+    some = False
+    for i in range(above, below):
+        z = top - HALF + i
+        some |= _residuals(
+            images[k, z, span],
+            usable[z, span],
+            white[k],
+            Ts,
+            c,
+            bases[0, z, span],
+            bases[1, z, span],
+            bases[2, z, span],
+            cap,
+            near[i, before:after],
+            lit[i, before:after],
+        )
+        _add_five(near[i], across[i])
+        _add_five(lit[i], among[i])
+    return some
+
+
+@njit(nogil=True, cache=True)
 def pooled_tile(
     images, usable, A, white, Ts, bases, cap, reach, slack, top, left, rows, columns, out
 ):  # pragma: no cover
@@ -84,7 +117,7 @@ def pooled_tile(
     Returns:
         Largest change of a solution, relative to the length of what it was.
     """
-    K, height, width = images.shape
+    K = len(images)
     wide, high = columns + 2 * HALF, rows + 2 * HALF
     # 0 beyond the picture
     near, lit = np.zeros((high, wide), np.float32), np.zeros((high, wide), np.float32)
@@ -92,30 +125,11 @@ def pooled_tile(
     sums, counts = np.empty(columns, np.float32), np.empty(columns, np.float32)
     u, y = np.empty(columns, np.float32), np.empty(columns, np.float32)
     total = np.zeros((rows, 10, columns), np.float32)
-    above, below = max(0, HALF - top), min(high, height + HALF - top)
-    before, after = max(0, HALF - left), min(wide, width + HALF - left)
-    z0, z1 = left - HALF + before, left - HALF + after
     for k in range(K):
         c = A[:, k].copy()
-        some = False
-        for i in range(above, below):
-            z = top - HALF + i
-            some |= _residuals(
-                images[k, z, z0:z1],
-                usable[z, z0:z1],
-                white[k],
-                Ts,
-                c,
-                bases[0, z, z0:z1],
-                bases[1, z, z0:z1],
-                bases[2, z, z0:z1],
-                cap,
-                near[i, before:after],
-                lit[i, before:after],
-            )
-            _add_five(near[i], across[i])
-            _add_five(lit[i], among[i])
-        if not some:
+        if not _look_around(
+            images, usable, A, white, Ts, bases, cap, top, left, k, near, lit, across, among
+        ):
             continue
         for i in range(rows):
             _add_rows(*_five(across, i), sums)
@@ -174,3 +188,38 @@ def _solve_tile(total, usable, bases, top, left, out):  # pragma: no cover
                     out[c, y, z] = w[c]
                 change = max(change, moved / (size + 1e-12))
     return np.sqrt(change)
+
+
+@njit(nogil=True, cache=True)
+def _clear(near, sums, counts, cap, reach, u):  # pragma: no cover
+    """How free of highlights the surroundings of a row of pixels are, 0 to 1; 1 where unlit."""
+    one, zero = np.float32(1), np.float32(0)
+    square = np.float32(WINDOW) * reach * reach
+    for j in range(len(u)):
+        bright = max(sums[j], zero)
+        w = max(one - bright * bright / (square * max(counts[j], one)), zero)
+        u[j] = w * w if near[j] < cap else zero
+
+
+@njit(nogil=True, cache=True)
+def clear_tile(
+    images, usable, A, white, Ts, bases, cap, reach, top, left, rows, columns, clear
+):  # pragma: no cover
+    """How free of highlights the surroundings of a tile's pixels are in each image.
+
+    Args:
+        clear: (K,H,W) float32, written in the tile, 0 to 1; the others as in `pooled_tile`.
+    """
+    wide, high = columns + 2 * HALF, rows + 2 * HALF
+    near, lit = np.zeros((high, wide), np.float32), np.zeros((high, wide), np.float32)
+    across, among = np.zeros((high, columns), np.float32), np.zeros((high, columns), np.float32)
+    sums, counts = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    for k in range(len(images)):
+        _look_around(
+            images, usable, A, white, Ts, bases, cap, top, left, k, near, lit, across, among
+        )
+        for i in range(rows):
+            _add_rows(*_five(across, i), sums)
+            _add_rows(*_five(among, i), counts)
+            u = clear[k, top + i, left : left + columns]
+            _clear(near[i + HALF, HALF : HALF + columns], sums, counts, cap, reach, u)

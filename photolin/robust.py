@@ -1,0 +1,164 @@
+"""Step 2 of the method `robust`: each pixel by itself, with its neighbours, and large pictures from
+thinned-out ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .analysis import Cancel, Options, Progress
+from .blocks import run_blocks
+from .consensus import stopping_table
+from .fine import choose_step, fit_fine, thin_out
+from .kernels import consensus_rows
+from .observations import Observations
+from .refit import find_clear, refit_bases
+from .settle import settle_ties
+from .stack import ImageStack
+
+BLOCK = 4096
+REACH = 4.0
+"""Residual, in units of the noise, from which an observation has no weight in the last fit."""
+LEAST_REACH = 0.003
+"""The least such residual, as a share of the brightest grays."""
+LEAST_NOISE = 6e-4
+"""The least noise, as a share of the brightest grays: rounding and faint light from elsewhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """What is known of a stack's observations."""
+
+    white: NDArray[np.float32]
+    """(K,) value from which observations of an image are saturated; infinity for none."""
+    noise: float
+    """Standard deviation of an observation, fraction of full scale."""
+
+
+@dataclass(frozen=True)
+class Talk:
+    """How work is done and watched; nothing of it changes the result."""
+
+    threads: int | None = None
+    progress: Progress | None = None
+    cancel: Cancel | None = None
+
+    def part(self, start: float, stop: float) -> "Talk":
+        """The same for a part of the stage that goes from `start` to `stop` of it."""
+        tell = self.progress
+        if tell is None:
+            return self
+        length = stop - start
+        return Talk(self.threads, lambda s, f: tell(s, start + f * length), self.cancel)
+
+
+def linearize_robustly(
+    stack: ImageStack,
+    coefficients: NDArray[np.float64],
+    T: float,
+    Ts: float,
+    options: Options,
+    quality: Quality,
+    talk: Talk,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Linearized bases (3,H,W), NaN where not determined, and margins (P,); see `linearize`."""
+    # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
+    q, r = np.linalg.qr(coefficients)
+    scale = np.sqrt(len(q) / 3)
+    factors = np.ascontiguousarray((q * scale).T, np.float32)
+    X = stack.images.reshape(len(stack.images), -1)
+    few = stack.pixels[:: max(1, len(stack.pixels) // 1000)]
+    bright = max(float(np.quantile(X[:, few], 0.99)), float(np.finfo(np.float32).tiny))
+    noise = quality.noise + LEAST_NOISE * bright
+    reach = max(REACH * quality.noise, LEAST_REACH * bright)
+    seen = Observations(stack.images, stack.mask, factors, quality.white, Ts, noise, bright)
+    rules = Rules(T, reach, options.samples, options.seed)
+    step = choose_step(len(stack.pixels))
+    if step == 1:
+        bases, lead = fit_together(seen, rules, talk)
+    else:
+        bases, lead = fit_from_thinned(seen, step, rules, talk)
+    back = (np.linalg.inv(r) * scale).astype(np.float32)
+    return np.tensordot(back, bases, 1), lead
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What decides a consensus."""
+
+    T: float
+    """Relative tolerance."""
+    reach: float
+    """Residual from which an observation has no weight in the last fit."""
+    limit: int
+    """The most samples."""
+    seed: int
+    """Of all samples."""
+
+
+def fit_together(
+    seen: Observations, rules: Rules, talk: Talk
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Bases (3,H,W) and lead (P,) by consensus, ties settled, shared highlights left out."""
+    pixels = np.flatnonzero(seen.mask)
+    bases = np.zeros(seen.images.shape[1:], np.float32)[None].repeat(3, axis=0)
+    lead = fit_alone(seen, pixels, rules, bases, talk.part(0, 0.4))
+    settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel)
+    rest = talk.part(0.4, 1)
+    return refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel), lead
+
+
+def fit_from_thinned(
+    seen: Observations, step: int, rules: Rules, talk: Talk
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The same for a picture too large to look at every pixel's surroundings."""
+    coarse = thin_out(seen, step)
+    first, _ = fit_together(coarse, rules, talk.part(0, 0.5))
+    clear = find_clear(coarse, first, talk.threads, talk.cancel)
+    rest = talk.part(0.5, 0.8)
+    bases, lead, doubtful = fit_fine(
+        seen, clear, step, rules.T, rest.threads, rest.progress, rest.cancel
+    )
+    alone = fit_alone(seen, doubtful, rules, bases, talk.part(0.8, 1))
+    lead.reshape(-1)[doubtful] = alone
+    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful)
+    return settled, lead[seen.mask]
+
+
+def fit_alone(
+    seen: Observations,
+    pixels: NDArray[np.intp],
+    rules: Rules,
+    bases: NDArray[np.float32],
+    talk: Talk,
+) -> NDArray[np.int32]:
+    """Consensus of each pixel by itself, into `bases` (3,H,W); NaN where nothing determines it.
+
+    Returns:
+        (P,) votes by which each won.
+    """
+    X = seen.images.reshape(len(seen.images), -1)
+    flat = bases.reshape(3, -1)
+    lead = np.zeros(len(pixels), np.int32)
+    tries, seed = stopping_table(rules.limit), np.uint64(rules.seed)
+    levels = (np.float32(rules.T), np.float32(seen.Ts), np.float32(rules.reach))
+
+    def work(start: int, stop: int) -> None:
+        some = pixels[start:stop]
+        out, score = np.full((len(some), 3), np.nan, np.float32), np.empty(len(some), np.int32)
+        consensus_rows(
+            *(X, some, seen.factors, seen.white, *levels, tries, rules.limit, seed),
+            *(out, score, lead[start:stop], 0, len(some)),
+        )
+        flat[:, some] = out.T
+
+    run_blocks(
+        work,
+        len(pixels),
+        BLOCK,
+        threads=talk.threads,
+        stage="linearize",
+        progress=talk.progress,
+        cancel=talk.cancel,
+    )
+    return lead
