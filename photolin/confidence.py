@@ -13,7 +13,7 @@ from .linearize import Quality
 from .near_light import WORTH, Regions
 from .stack import ImageStack
 
-BLOCK = 1 << 14
+BLOCK = 1 << 13
 JUDGES = 6000
 """Pixels that judge an image, about."""
 FEW = 4
@@ -52,25 +52,19 @@ def measure_confidence(
         margin: (P,) of `linearize`.
     """
     K, H, W = stack.shape
-    P = len(stack.pixels)
     X, flat = stack.images.reshape(K, -1), labels.reshape(K, -1)
     A = np.ascontiguousarray(orthogonalize(coefficients).T, np.float32)
-    lit, diffuse = np.empty(P, np.uint16), np.empty(P, np.uint16)
-    spread, Ts = np.empty(P, np.float32), np.float32(thresholds.Ts)
+    lit, diffuse = np.empty(H * W, np.uint16), np.empty(H * W, np.uint16)
+    spread, Ts = np.empty(H * W, np.float32), np.float32(thresholds.Ts)
 
     def work(start: int, stop: int) -> None:
-        evidence_rows(
-            X, flat, stack.pixels, A, quality.white, Ts, lit, diffuse, spread, start, stop
-        )
+        evidence_rows(X, flat, A, quality.white, Ts, lit, diffuse, spread, start, stop)
 
-    run_blocks(work, P, BLOCK, threads=threads)
-
-    def paint(values: NDArray) -> NDArray:
-        image = np.zeros(H * W, values.dtype)
-        image[stack.pixels] = values
-        return image.reshape(H, W)
-
-    step = max(1, P // JUDGES)
+    run_blocks(work, H * W, BLOCK, threads=threads)
+    lit[~stack.mask.reshape(-1)] = 0
+    lead = np.zeros((H, W), np.uint16)
+    lead[stack.mask] = np.minimum(margin, np.iinfo(np.uint16).max)
+    step = max(1, len(stack.pixels) // JUDGES)
     some = stack.pixels[::step]
     seen = X[:, some]
     saturated = seen >= quality.white[:, None]
@@ -82,10 +76,10 @@ def measure_confidence(
         quality.noise,
     )
     return Confidence(
-        lit=paint(lit),
-        diffuse=paint(diffuse),
-        margin=paint(np.minimum(margin, np.iinfo(np.uint16).max).astype(np.uint16)),
-        spread=paint(spread),
+        lit=lit.reshape(H, W),
+        diffuse=diffuse.reshape(H, W),
+        margin=lead,
+        spread=spread.reshape(H, W),
         support=support,
         residual=residual,
         gain=gain,

@@ -72,10 +72,10 @@ def fit_fine(
         Cancelled: `cancel` said so.
     """
     _, H, W = seen.images.shape
-    bases = np.zeros((3, H, W), np.float32)
-    lead, doubt = np.zeros((H, W), np.int32), np.zeros((H, W), bool)
+    bases = np.empty((3, H, W), np.float32)
+    lead, doubt = np.empty((H, W), np.int32), np.empty((H, W), bool)
     width = max(1, COLUMNS // step) * step
-    known = (seen.images, seen.mask, seen.factors, seen.white, np.float32(seen.Ts), clear)
+    known = (seen.images, seen.factors, seen.white, np.float32(seen.Ts), clear)
     room = (np.float32(T), np.float32(WIDE * seen.noise))
 
     def work(start: int, stop: int) -> None:
@@ -95,4 +95,6 @@ def fit_fine(
         progress=progress,
         cancel=cancel,
     )
+    if not seen.mask.all():
+        bases[:, ~seen.mask] = 0
     return bases, lead, np.flatnonzero(doubt & seen.mask)

@@ -44,6 +44,8 @@ LATE = 2
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
 DAMPING = 1e-6
+HESSIAN_PIXELS = 800
+"""Pixels that say how the coefficients depend on each other, at least."""
 
 
 def refine_coefficients(
@@ -184,7 +186,9 @@ def gauss_newton_step(
     b = (inverse @ ((w * x) @ c)[:, :, None])[:, :, 0]
     gradient = (w * (x - b @ c.T)).T @ b
     # b follows c: what a change of c moves within the span of c does not count
-    # the Hessian only says which way to step: float32 is enough, and twice as fast
+    # the Hessian only says which way to step: float32 and some of the pixels are enough
+    step = max(1, len(b) // HESSIAN_PIXELS)
+    b, w, inverse = b[::step], w[::step] * step, inverse[::step] / step
     spanned = np.linalg.cholesky(inverse).transpose(0, 2, 1) @ c.T * w[:, None, :]
     spanned = spanned.astype(np.float32).reshape(-1, K)
     hessian = np.empty((K, 3, K, 3))

@@ -5,10 +5,9 @@ few pixels, though, the residuals of one image have the same sign: their mean sh
 five times fainter. Images without scene structure in common (noise) average out.
 """
 
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from .analysis import Cancel, Progress
@@ -16,39 +15,27 @@ from .blocks import run_blocks
 from .kernels import clear_tile, pooled_tile
 from .observations import Observations
 
-TILE = 32
+TILE = (16, 128)
+"""Rows and columns: long rows suit the loops, and what is summed up stays in the cache."""
 ROUNDS = 10
 ANNEAL = (4.0, 2.0)
 """Reach of the first rounds, in units of the last: a first fit holds highlights itself."""
-REACH = 2.5
+REACH = 3.0
 """Mean residual of a window, in units of its noise, from which it is a highlight."""
-CAP = 0.06
-"""Residual, as a share of the brightest grays, beyond which one observation is out by itself."""
+CAP, CAP_NOISE = 0.02, 4.0
+"""Residual from which one observation is out by itself: a share of the brightest grays (a fit that
+still holds highlights is too high) and some noise."""
 LEAST = 5e-4
 """The least noise of means, as a share of the brightest grays."""
-BELOW = 4.0
-"""Residual below the fit, in units of the noise, beyond which an observation is out."""
-SLACK = 0.02
-"""... and as a share of the brightest grays: a fit that still holds highlights is too high."""
 STILL = 0.1
 """Change of a pixel, in units of the noise, from which its surroundings are fitted once more."""
+GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 PATCHES, PATCH = 40, 12
 """Squares of pixels in which the noise of means is measured."""
 
 
 Tile = tuple[slice, slice]
 """Rows and columns."""
-
-
-class Limits(NamedTuple):
-    """Residuals that cost an observation its say, fractions of full scale."""
-
-    cap: float
-    """Of its own, on either side."""
-    reach: float
-    """Above the fit, of the mean of a full window."""
-    slack: float
-    """Of its own, below the fit."""
 
 
 def refit_bases(
@@ -62,7 +49,8 @@ def refit_bases(
 
     The weight of an observation falls with the mean residual of its image in a window of 5 x 5
     pixels, in units of the noise that such means show below zero, where no highlight is. Repeated
-    until still, where it is not; a pixel with too few such observations keeps its solution.
+    until still, where it is not; a pixel with too few such observations keeps its solution. The
+    bases given have to be good: what is one percent too low would take everything for a highlight.
 
     Args:
         bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
@@ -78,14 +66,13 @@ def refit_bases(
     new = old.copy()
     tiles = {at: t for at, t in split(seen.mask.shape).items() if usable[t].any()}
     least = STILL * seen.noise / seen.bright
-    cap = widest(seen)
-    slack, reach = BELOW * seen.noise + SLACK * seen.bright, 0.0
+    cap, reach = widest(seen), 0.0
     for round_ in range(ROUNDS):
         if round_ <= len(ANNEAL):
             means = measure_means(seen, usable, cap, old) + LEAST * seen.bright
             reach = REACH * means * (*ANNEAL, 1.0)[round_]
-        limits = Limits(cap, reach, slack)
-        change = fit_tiles(seen, usable, limits, list(tiles.values()), old, new, threads, cancel)
+        fit = partial(fit_tiles, seen, usable, cap, reach, list(tiles.values()))
+        change = fit(old, new, threads, cancel)
         if progress is not None:
             progress("linearize", (round_ + 1) / ROUNDS)
         old, new = new, old
@@ -126,19 +113,20 @@ def find_clear(
             place = (rows.start, columns.start)
             clear_tile(*known, np.float32(cap), np.float32(reach), *place, *size, clear)
 
-    run_blocks(work, len(tiles), 4, threads=threads, cancel=cancel)
+    run_blocks(work, len(tiles), 2, threads=threads, stage="linearize", cancel=cancel)
     return clear
 
 
 def widest(seen: Observations) -> float:
     """Residual beyond which one observation is out by itself, fraction of full scale."""
-    return max(CAP * seen.bright, BELOW * seen.noise)
+    return CAP * seen.bright + CAP_NOISE * seen.noise
 
 
 def fit_tiles(
     seen: Observations,
     usable: NDArray[np.bool_],
-    limits: Limits,
+    cap: float,
+    reach: float,
     tiles: list[Tile],
     old: NDArray[np.float32],
     new: NDArray[np.float32],
@@ -148,7 +136,7 @@ def fit_tiles(
     """Fit the pixels of some tiles from the bases `old` into `new`; largest change in each."""
     change = np.zeros(len(tiles))
     known = (seen.images, usable, seen.factors, seen.white, np.float32(seen.Ts), old)
-    cuts = (np.float32(limits.cap), np.float32(limits.reach), np.float32(limits.slack))
+    cuts = (np.float32(cap), np.float32(reach))
 
     def work(start: int, stop: int) -> None:
         for job in range(start, stop):
@@ -156,14 +144,15 @@ def fit_tiles(
             size = (rows.stop - rows.start, columns.stop - columns.start)
             change[job] = pooled_tile(*known, *cuts, rows.start, columns.start, *size, new)
 
-    run_blocks(work, len(tiles), 4, threads=threads, cancel=cancel)
+    run_blocks(work, len(tiles), 2, threads=threads, stage="linearize", cancel=cancel)
     return change
 
 
 def split(shape: tuple[int, int]) -> dict[tuple[int, int], Tile]:
     """The tiles of a picture, by their place in the grid."""
     rows, columns = (
-        [slice(at, min(at + TILE, size)) for at in range(0, size, TILE)] for size in shape
+        [slice(at, min(at + side, size)) for at in range(0, size, side)]
+        for side, size in zip(TILE, shape, strict=True)
     )
     return {(i, j): (r, c) for i, r in enumerate(rows) for j, c in enumerate(columns)}
 
@@ -185,21 +174,28 @@ def measure_means(
     pixels = np.flatnonzero(usable)
     if not pixels.size:
         return 0.0
-    centres = pixels[np.linspace(0, len(pixels) - 1, PATCHES).astype(int)]
+    # multiples of an irrational number: no step that rows of the picture could be in tune with
+    spread = np.arange(PATCHES) * GOLDEN_RATIO % 1
     rows, columns = (
-        np.clip(at[:, None] + np.arange(PATCH) - PATCH // 2, 0, size - 1)
-        for at, size in zip(np.divmod(centres, W), (H, W), strict=True)
+        at[:, None] + np.arange(PATCH) - PATCH // 2
+        for at in np.divmod(pixels[(spread * len(pixels)).astype(int)], W)
     )
-    place = (rows[:, :, None], columns[:, None, :])
+    inside = ((rows >= 0) & (rows < H))[:, :, None] & ((columns >= 0) & (columns < W))[:, None, :]
+    place = (rows.clip(0, H - 1)[:, :, None], columns.clip(0, W - 1)[:, None, :])
     x = seen.images[:, *place]
     l = np.tensordot(seen.factors.T, bases[:, *place], 1)
-    lit = (x >= seen.Ts) & (x < seen.white[:, None, None, None]) & usable[place]
+    lit = (x >= seen.Ts) & (x < seen.white[:, None, None, None])
+    lit &= usable[place] & inside
     near = np.where(lit, np.clip(x - l, -cap, cap), 0)
-    sums, counts = (
-        sliding_window_view(a, (5, 5), axis=(2, 3)).sum((-1, -2), dtype=np.float32)
-        for a in (near, lit)
-    )
+    sums, counts = window_sums(near), window_sums(lit.astype(np.float32))
     inner = (counts > 12) & lit[:, :, 2:-2, 2:-2]
     means = sums[inner] / np.sqrt(25 * counts[inner])
     below = means[means < 0]
     return float(np.median(-below) / 0.6745) if below.size else 0.0
+
+
+def window_sums(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sums over 5 x 5 windows of the last two axes, which become 4 shorter."""
+    size = values.shape[-1] - 4
+    across = sum((values[..., i : i + size] for i in range(1, 5)), values[..., :size])
+    return sum((across[..., i : i + size, :] for i in range(1, 5)), across[..., :size, :])

@@ -67,8 +67,8 @@ def linearize_robustly(
     scale = np.sqrt(len(q) / 3)
     factors = np.ascontiguousarray((q * scale).T, np.float32)
     X = stack.images.reshape(len(stack.images), -1)
-    few = stack.pixels[:: max(1, len(stack.pixels) // 1000)]
-    bright = max(float(np.quantile(X[:, few], 0.99)), float(np.finfo(np.float32).tiny))
+    some = X[:, stack.pixels[:: max(1, len(stack.pixels) // 1000)]]
+    bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
     reach = max(REACH * quality.noise, LEAST_REACH * bright)
     seen = Observations(stack.images, stack.mask, factors, quality.white, Ts, noise, bright)

@@ -56,13 +56,13 @@ def settle_ties(
     def weigh(start: int, stop: int) -> None:
         trust_rows(X, pixels, *known, np.float32(CERTAIN), flat, lead, trust, start, stop)
 
-    run_blocks(weigh, len(pixels), BLOCK, threads=threads, cancel=cancel)
+    run_blocks(weigh, len(pixels), BLOCK, threads=threads, stage="linearize", cancel=cancel)
     doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
     for _ in range(SWEEPS):
         out = np.empty((len(doubtful), 3), np.float32)
         gained = np.empty(len(doubtful), np.float32)
         work = partial(settle_rows, X, W, doubtful, *known, flat, trust, out, gained)
-        run_blocks(work, len(doubtful), FEW, threads=threads, cancel=cancel)
+        run_blocks(work, len(doubtful), FEW, threads=threads, stage="linearize", cancel=cancel)
         changed = gained >= 0
         if not changed.any():
             break

@@ -496,11 +496,10 @@ def test_evidence_is_the_twins() -> None:
     labels[2, 10:20] = 1
     A = rng.normal(size=(3, K)).astype(f32)
     white = np.where(np.arange(K) < 9, f32(0.9), f32(np.inf)).astype(f32)
-    columns = rng.permutation(N)[:250]
-    lit, diffuse = np.full(250, 77, np.uint16), np.full(250, 77, np.uint16)
-    spread = np.full(250, 77, f32)
-    evidence_rows(X, labels, columns, A, white, f32(0.3), lit, diffuse, spread, 3, 240)
-    expected = evidence(X, labels, columns, A, white, 0.3)
+    lit, diffuse = np.full(N, 77, np.uint16), np.full(N, 77, np.uint16)
+    spread = np.full(N, 77, f32)
+    evidence_rows(X, labels, A, white, f32(0.3), lit, diffuse, spread, 3, 240)
+    expected = evidence(X, labels, np.arange(N), A, white, 0.3)
     np.testing.assert_array_equal(lit[3:240], expected[0][3:240])
     np.testing.assert_array_equal(diffuse[3:240], expected[1][3:240])
     np.testing.assert_allclose(spread[3:240], expected[2][3:240], rtol=1e-5, atol=1e-6)
@@ -521,7 +520,6 @@ def test_spread_is_one_for_even_lights_and_none_in_a_plane(
     X, labels = np.ones((6, 1), f32), np.ones((6, 1), np.uint8)
     counts, spread = np.empty((2, 1), np.uint16), np.empty(1, f32)
     white = np.full(6, np.inf, f32)
-    columns = np.zeros(1, np.int64)
-    evidence_rows(X, labels, columns, A.astype(f32), white, f32(0), *counts, spread, 0, 1)
+    evidence_rows(X, labels, A.astype(f32), white, f32(0), *counts, spread, 0, 1)
     assert spread[0] == pytest.approx(expected, abs=0.02)
     assert counts.ravel().tolist() == [6, 6]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
-from photolin.kernels import pooled_tile
+from photolin.kernels import clear_tile, pooled_tile
 
 f32 = np.float32
 Array = np.ndarray
@@ -55,16 +55,22 @@ def sums(a: Array) -> Array:
     return sliding_window_view(padded, (5, 5), axis=(1, 2)).sum(axis=(-1, -2))
 
 
-def pooled(known: Problem, limits: tuple[float, ...]) -> tuple[Array, Array]:
-    """Solutions of the whole picture and their relative changes; -1 where a pixel keeps its own."""
+def look_around(known: Problem, cap: float, reach: float) -> tuple[Array, Array, Array]:
+    """Residuals of the whole picture, which are lit, and how clear their surroundings are."""
     images, usable, A, white, Ts, bases = known
-    cap, reach, slack = limits
     residual = images - np.tensordot(A.T, bases, 1)
     lit = usable & (images >= Ts) & (images < white[:, None, None])
     near, counts = np.where(lit, residual.clip(-cap, cap), 0), np.maximum(sums(lit), 1)
-    mean = np.maximum(sums(near), 0) / counts
-    above, below = mean / (reach * 5 / np.sqrt(counts)), np.minimum(near, 0) / slack
-    u = (np.maximum(1 - above**2, 0) * np.maximum(1 - below**2, 0)) ** 2
+    above = np.maximum(sums(near), 0) / counts / (reach * 5 / np.sqrt(counts))
+    return np.where(lit, residual, 0), lit, np.maximum(1 - above**2, 0) ** 2
+
+
+def pooled(known: Problem, limits: tuple[float, ...]) -> tuple[Array, Array]:
+    """Solutions of the whole picture and their relative changes; -1 where a pixel keeps its own."""
+    images, usable, A, *_, bases = known
+    cap, reach, slack = limits
+    residual, lit, u = look_around(known, cap, reach)
+    u *= np.maximum(1 - (np.minimum(residual, 0) / slack) ** 2, 0) ** 2
     u *= lit & (np.abs(residual) < cap)
     out, change = bases.copy(), np.full(usable.shape, -1.0)
     for at in zip(*np.nonzero(usable & (u.sum(axis=0) >= 3.5)), strict=True):
@@ -207,3 +213,18 @@ def test_a_black_pixel_may_become_bright() -> None:
     out, [change] = fit(known, OPEN, (0, 0, 1, 1))
     np.testing.assert_allclose(out, best, atol=1e-6)
     assert 1 < change < np.inf
+
+
+@pytest.mark.parametrize("tile", [WHOLE, (7, 9, 8, 11), (0, 25, 4, 5), (20, 0, 3, 9)])
+def test_how_clear_surroundings_are_is_the_twins(tile: tuple[int, ...]) -> None:
+    """A pixel that is not lit has surroundings too; far below the fit is no highlight."""
+    known, (cap, reach, _) = problem(8), LIMITS
+    residual, _, clear = look_around(known, cap, reach)
+    out = np.full_like(known[0], 7)
+    clear_tile(*known, f32(cap), f32(reach), *tile, out)
+    inside = np.zeros(SIZE, bool)
+    inside[tile[0] : tile[0] + tile[2], tile[1] : tile[1] + tile[3]] = True
+    expected = np.where(residual < cap, clear, 0)[:, inside]
+    np.testing.assert_allclose(out[:, inside], expected, atol=1e-5)
+    assert (out[:, ~inside] == 7).all()
+    assert min((expected == 0).mean(), (expected > 0.5).mean()) > 0.02

@@ -5,6 +5,8 @@ from numba import njit
 
 MIN_WEIGHT = 3.5
 """Sum of weights below which a weighted fit would follow single observations."""
+SINGULAR = 1e-9
+"""Determinant of sums in double precision, relative to their diagonal, that may be rounding."""
 SUMS = {"reassoc", "nsz"}
 """Lets sums be taken in vectors; nothing else of IEEE arithmetic is given up."""
 UNFIT = -(2**30)
@@ -54,13 +56,14 @@ def _misfit(x, a0, a1, a2, n, v, T):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out):  # pragma: no cover
-    """out = inverse(G) h for symmetric 3x3 G; false where G is singular."""
+def _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, least, out):  # pragma: no cover
+    """out = inverse(G) h for symmetric 3x3 G; false where its determinant is at most `least` of its
+    diagonal's."""
     c00 = g11 * g22 - g12 * g12
     c01 = g02 * g12 - g01 * g22
     c02 = g01 * g12 - g02 * g11
     det = g00 * c00 + g01 * c01 + g02 * c02
-    if not det > 1e-9 * g00 * g11 * g22:
+    if not det > least * g00 * g11 * g22:
         return False
     c11 = g00 * g22 - g02 * g02
     c12 = g01 * g02 - g00 * g12
@@ -90,7 +93,7 @@ def _refit(x, a0, a1, a2, n, v, T, out):  # pragma: no cover
         h0 += b0 * y
         h1 += b1 * y
         h2 += b2 * y
-    return count >= 3 and _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, out)
+    return count >= 3 and _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, SINGULAR, out)
 
 
 @njit(nogil=True, cache=True, fastmath=SUMS)
@@ -118,7 +121,7 @@ def _polish(x, a0, a1, a2, n, reach, w, v):  # pragma: no cover
             h0 += b0 * y
             h1 += b1 * y
             h2 += b2 * y
-        if weight < MIN_WEIGHT or not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, w):
+        if weight < MIN_WEIGHT or not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, SINGULAR, w):
             return
         v[0], v[1], v[2] = w[0], w[1], w[2]
 

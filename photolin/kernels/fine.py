@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from .consensus import MIN_WEIGHT, _solve
-from .pooled import _add
+from .pooled import SINGULAR, _add
 
 # Inner loops run over whole rows with indices from 0: only those become vector instructions.
 
@@ -19,19 +19,17 @@ def _spread(weights, step, out):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _take(x, usable, white, Ts, weights, u, y):  # pragma: no cover
+def _take(x, white, Ts, weights, u, y):  # pragma: no cover
     """u = weights of the lit observations of a row, y = u x."""
     zero = np.float32(0)
     for j in range(len(x)):
-        u[j] = weights[j] if usable[j] & (x[j] >= Ts) & (x[j] < white) else zero
+        u[j] = weights[j] if (x[j] >= Ts) & (x[j] < white) else zero
         y[j] = u[j] * x[j]
 
 
 @njit(nogil=True, cache=True)
-def _judge(
-    x, usable, white, Ts, c, b0, b1, b2, weights, T, wide, lit, diffuse, against
-):  # pragma: no cover
-    """Count, for a row of one image, what is lit, what is D, and what contradicts the fit.
+def _judge(x, white, Ts, c, b0, b1, b2, weights, T, wide, lead, against):  # pragma: no cover
+    """Count, for a row of one image, what is lit and again what is D, and what contradicts the fit.
 
     That is what is darker than possible, or far from the fit though no highlight was seen there.
     """
@@ -40,12 +38,12 @@ def _judge(
     for j in range(len(x)):
         l = c0 * b0[j] + c1 * b1[j] + c2 * b2[j]
         r = x[j] - l
-        seen = usable[j] & (x[j] >= Ts) & (x[j] < white)
-        room = max(T * x[j], wide)
+        slack = T * x[j]
+        room = max(slack, wide)
+        seen = (x[j] >= Ts) & (x[j] < white)
         wrong = (r < -room) | (l < -wide) | ((r > room) & (weights[j] >= half))
-        lit[j] += np.int32(seen)
-        diffuse[j] += np.int32(seen & (abs(r) <= T * x[j]))
-        against[j] += np.int32(seen & wrong)
+        lead[j] += np.int32(seen) + np.int32(seen & (abs(r) <= slack))
+        against[j] |= np.int32(seen & wrong)
 
 
 @njit(nogil=True, cache=True)
@@ -64,46 +62,44 @@ def _solve_row(total, b0, b1, b2, doubt):  # pragma: no cover
             np.float64(g[6]),
             np.float64(g[7]),
             np.float64(g[8]),
+            SINGULAR,
             w,
         )
         doubt[j] = not good
-        if good:
-            b0[j], b1[j], b2[j] = w[0], w[1], w[2]
+        if not good:
+            w[:] = 0
+        b0[j], b1[j], b2[j] = w[0], w[1], w[2]
 
 
 @njit(nogil=True, cache=True)
 def fine_band(
-    images, usable, A, white, Ts, weights, step, T, wide, top, left, rows, columns, out, lead, doubt
+    images, A, white, Ts, weights, step, T, wide, top, left, rows, columns, out, lead, doubt
 ):  # pragma: no cover
     """Fit some pixels with the weights of the blocks they lie in, and check the fit.
 
     Args:
         images: (K,H,W) float32 observations.
-        usable: (H,W) bool, pixels of the object.
         A: (3,K) float32 coefficients in an orthogonal frame.
         white: (K,) float32, saturated from there on.
         Ts, T: float32 thresholds.
         weights: (K,h,w) float32 weights of blocks of `step` x `step` pixels.
         wide: float32 residual that noise may have.
         top, left: multiples of step; `rows` is at most `step`.
-        out: (3,H,W) float32, written.
+        out: (3,H,W) float32, written, 0 where the fit fails.
         lead: (H,W) int32, written: 2 D + S, the votes ahead of none at all.
         doubt: (H,W) bool, written: the fit fails, or observations contradict it.
     """
     K = len(images)
     block = slice(left // step, -(-(left + columns) // step))
-    wide_row = np.empty((block.stop - block.start) * step, np.float32)
-    w = wide_row[:columns]
+    spread = np.empty((K, (block.stop - block.start) * step), np.float32)
     u, y = np.empty(columns, np.float32), np.empty(columns, np.float32)
     total = np.zeros((rows, 10, columns), np.float32)
-    one = np.float32(1)
+    span = slice(left, left + columns)
     for k in range(K):
-        _spread(weights[k, top // step, block], step, wide_row)
+        _spread(weights[k, top // step, block], step, spread[k])
         c = A[:, k].copy()
         for i in range(rows):
-            z = top + i
-            x, inside = images[k, z, left : left + columns], usable[z, left : left + columns]
-            _take(x, inside, white[k], Ts, w, u, y)
+            _take(images[k, top + i, span], white[k], Ts, spread[k, :columns], u, y)
             n = 0
             for a in range(3):
                 for b in range(a, 3):
@@ -111,35 +107,17 @@ def fine_band(
                     n += 1
             for a in range(3):
                 _add(total[i, 6 + a], y, c[a])
-            _add(total[i, 9], u, one)
-    span = slice(left, left + columns)
+            _add(total[i, 9], u, np.float32(1))
+    against = np.zeros(columns, np.int32)
     for i in range(rows):
         z = top + i
-        _solve_row(total[i], out[0, z, span], out[1, z, span], out[2, z, span], doubt[z, span])
-    lit, diffuse = np.zeros((rows, columns), np.int32), np.zeros((rows, columns), np.int32)
-    against = np.zeros((rows, columns), np.int32)
-    for k in range(K):
-        _spread(weights[k, top // step, block], step, wide_row)
-        c = A[:, k].copy()
-        for i in range(rows):
-            z = top + i
-            _judge(
-                images[k, z, span],
-                usable[z, span],
-                white[k],
-                Ts,
-                c,
-                out[0, z, span],
-                out[1, z, span],
-                out[2, z, span],
-                w,
-                T,
-                wide,
-                lit[i],
-                diffuse[i],
-                against[i],
-            )
-    for i in range(rows):
+        b0, b1, b2 = out[0, z, span], out[1, z, span], out[2, z, span]
+        _solve_row(total[i], b0, b1, b2, doubt[z, span])
+        votes = lead[z, span]
+        votes[:] = 0
+        against[:] = 0
+        for k in range(K):
+            x, w, c = images[k, z, span], spread[k, :columns], A[:, k].copy()
+            _judge(x, white[k], Ts, c, b0, b1, b2, w, T, wide, votes, against)
         for j in range(columns):
-            lead[top + i, left + j] = lit[i, j] + diffuse[i, j]
-            doubt[top + i, left + j] |= against[i, j] > 0
+            doubt[z, left + j] |= against[j] != 0

@@ -4,7 +4,7 @@ likely."""
 import numpy as np
 from numba import njit
 
-from .consensus import _solve
+from .consensus import SINGULAR, _solve
 
 MOST = 24
 """Neighbours of a pixel: a window of 5 x 5 without its centre."""
@@ -114,7 +114,7 @@ def _lean(x, a0, a1, a2, n, units, say, count, noise, v, w):  # pragma: no cover
         h0 += b0 * y
         h1 += b1 * y
         h2 += b2 * y
-    if not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, w):
+    if not _solve(g00, g01, g02, g11, g12, g22, h0, h1, h2, SINGULAR, w):
         return False
     v[0], v[1], v[2] = w[0], w[1], w[2]
     return True

@@ -7,6 +7,9 @@ from .consensus import MIN_WEIGHT, _solve
 
 HALF = 2
 """A window is 2 HALF + 1 = 5 pixels wide."""
+SINGULAR = 1e-5
+"""Determinant of sums in single precision, relative to their diagonal, that may be rounding."""
+TINY = np.float32(1e-30)
 WINDOW = (2 * HALF + 1) ** 2
 
 # Inner loops run over whole rows with indices from 0: only those become vector instructions.
@@ -42,17 +45,17 @@ def _add_rows(a, b, c, d, e, sums):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _weigh(near, lit, sums, counts, cap, reach, slack, u):  # pragma: no cover
+def _weigh(near, lit, sums, counts, cap, reach, u):  # pragma: no cover
     """Weights of a row of observations, from their own residuals and the sums around them."""
     one, zero = np.float32(1), np.float32(0)
     # a mean of n residuals varies by 5 / sqrt(n) as much as one of 25
-    square = np.float32(WINDOW) * reach * reach
+    square = max(np.float32(WINDOW) * reach * reach, TINY)
     for j in range(len(u)):
         bright = max(sums[j], zero)
         over = bright * bright / (square * max(counts[j], one))
-        under = min(near[j], zero) / slack
-        w = max(one - over, zero) * max(one - under * under, zero)
-        u[j] = w * w * lit[j] if abs(near[j]) < cap else zero
+        own = near[j] / cap
+        w = max(one - over, zero) * max(one - own * own, zero)
+        u[j] = w * w * lit[j]
 
 
 @njit(nogil=True, cache=True)
@@ -97,7 +100,7 @@ def _look_around(
 
 @njit(nogil=True, cache=True)
 def pooled_tile(
-    images, usable, A, white, Ts, bases, cap, reach, slack, top, left, rows, columns, out
+    images, usable, A, white, Ts, bases, cap, reach, top, left, rows, columns, out
 ):  # pragma: no cover
     """Fit a tile's pixels to the observations around which no highlight is seen.
 
@@ -108,9 +111,8 @@ def pooled_tile(
         white: (K,) float32, saturated from there on.
         Ts: float32 shadow level.
         bases: (3,H,W) float32 solutions so far, finite where usable.
-        cap: float32 residual beyond which an observation has no say, whatever is around it.
+        cap: float32 residual from which an observation has no say, whatever is around it.
         reach: float32 mean residual of a full window from which there is a highlight.
-        slack: float32 residual below the fit from which an observation has no say.
         top, left, rows, columns: the tile.
         out: (3,H,W) float32, written in the tile.
 
@@ -135,7 +137,7 @@ def pooled_tile(
             _add_rows(*_five(across, i), sums)
             _add_rows(*_five(among, i), counts)
             own, there = near[i + HALF, HALF : HALF + columns], lit[i + HALF, HALF : HALF + columns]
-            _weigh(own, there, sums, counts, cap, reach, slack, u)
+            _weigh(own, there, sums, counts, cap, reach, u)
             x = images[k, top + i, left : left + columns]
             for j in range(columns):
                 y[j] = u[j] * x[j]
@@ -179,6 +181,7 @@ def _solve_tile(total, usable, bases, top, left, out):  # pragma: no cover
                 np.float64(g[6]),
                 np.float64(g[7]),
                 np.float64(g[8]),
+                SINGULAR,
                 w,
             ):
                 moved = size = 0.0
@@ -192,9 +195,9 @@ def _solve_tile(total, usable, bases, top, left, out):  # pragma: no cover
 
 @njit(nogil=True, cache=True)
 def _clear(near, sums, counts, cap, reach, u):  # pragma: no cover
-    """How free of highlights the surroundings of a row of pixels are, 0 to 1; 1 where unlit."""
+    """How free of highlights the surroundings of some pixels are, 0 to 1; 1 without lit ones."""
     one, zero = np.float32(1), np.float32(0)
-    square = np.float32(WINDOW) * reach * reach
+    square = max(np.float32(WINDOW) * reach * reach, TINY)
     for j in range(len(u)):
         bright = max(sums[j], zero)
         w = max(one - bright * bright / (square * max(counts[j], one)), zero)
