@@ -56,6 +56,7 @@ def refine_coefficients(
     seed: int,
     limit: int,
     cancel: Cancel | None = None,
+    rounds: int = ROUNDS,
 ) -> Factorization:
     """The factorization that best explains the diffuse observations, from rough coefficients.
 
@@ -66,6 +67,8 @@ def refine_coefficients(
     Args:
         coefficients: (K,3)
         T: relative tolerance; None: follows the noise that is found.
+        rounds: how many at most; with a few, only the last ones of the annealing, for coefficients
+            that are nearly right.
 
     Raises:
         DegenerateError: the observations do not determine coefficients.
@@ -74,9 +77,10 @@ def refine_coefficients(
     before = c = orthogonalize(coefficients)
     noise = Noise(FIRST_T / CUT, 0.0, FIRST_T)
     bases, score = np.empty((3, 0), np.float32), np.empty(0, np.int32)
-    some, more = sample.thin(ROUGH_PIXELS), sample.thin(MORE_PIXELS)
-    for round_ in range(ROUNDS):
-        if round_ == EARLY:
+    some = few = sample.thin(ROUGH_PIXELS)
+    more = sample.thin(MORE_PIXELS)
+    for round_ in range(ROUNDS - rounds, ROUNDS):
+        if round_ >= EARLY and some is few:
             some = more
         if round_ >= ROUNDS - LATE:
             some = sample

@@ -44,6 +44,7 @@ def refit_bases(
     threads: int | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
+    rounds: int = ROUNDS,
 ) -> NDArray[np.float32]:
     """Fit all pixels again to the observations whose surroundings show no highlight.
 
@@ -54,6 +55,7 @@ def refit_bases(
 
     Args:
         bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
+        rounds: how many at most.
 
     Returns:
         (3,H,W); does not depend on threads.
@@ -67,14 +69,14 @@ def refit_bases(
     tiles = {at: t for at, t in split(seen.mask.shape).items() if usable[t].any()}
     least = STILL * seen.noise / seen.bright
     cap, reach = widest(seen), 0.0
-    for round_ in range(ROUNDS):
+    for round_ in range(rounds):
         if round_ <= len(ANNEAL):
             means = measure_means(seen, usable, cap, old) + LEAST * seen.bright
             reach = REACH * means * (*ANNEAL, 1.0)[round_]
         fit = partial(fit_tiles, seen, usable, cap, reach, list(tiles.values()))
         change = fit(old, new, threads, cancel)
         if progress is not None:
-            progress("linearize", (round_ + 1) / ROUNDS)
+            progress("linearize", (round_ + 1) / rounds)
         old, new = new, old
         if round_ >= len(ANNEAL):
             # what is not worked on again has to be the same in both

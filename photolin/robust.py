@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from .analysis import Cancel, Options, Progress
 from .blocks import run_blocks
 from .consensus import stopping_table
+from .factors import Thresholds
 from .fine import choose_step, fit_fine, thin_out
 from .kernels import consensus_rows
 from .observations import Observations
-from .refit import find_clear, refit_bases
+from .refit import ROUNDS, find_clear, refit_bases
 from .settle import settle_ties
 from .stack import ImageStack
 
@@ -55,11 +56,11 @@ class Talk:
 def linearize_robustly(
     stack: ImageStack,
     coefficients: NDArray[np.float64],
-    T: float,
-    Ts: float,
+    thresholds: Thresholds,
     options: Options,
     quality: Quality,
     talk: Talk,
+    rounds: int = ROUNDS,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Linearized bases (3,H,W), NaN where not determined, and margins (P,); see `linearize`."""
     # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
@@ -71,8 +72,10 @@ def linearize_robustly(
     bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
     reach = max(REACH * quality.noise, LEAST_REACH * bright)
-    seen = Observations(stack.images, stack.mask, factors, quality.white, Ts, noise, bright)
-    rules = Rules(T, reach, options.samples, options.seed)
+    seen = Observations(
+        stack.images, stack.mask, factors, quality.white, thresholds.Ts, noise, bright
+    )
+    rules = Rules(thresholds.T, reach, options.samples, options.seed, rounds)
     step = choose_step(len(stack.pixels))
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
@@ -94,6 +97,8 @@ class Rules:
     """The most samples."""
     seed: int
     """Of all samples."""
+    rounds: int = ROUNDS
+    """Rounds of `refit_bases`."""
 
 
 def fit_together(
@@ -105,7 +110,8 @@ def fit_together(
     lead = fit_alone(seen, pixels, rules, bases, talk.part(0, 0.4))
     settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel)
     rest = talk.part(0.4, 1)
-    return refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel), lead
+    refitted = refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rules.rounds)
+    return refitted, lead
 
 
 def fit_from_thinned(

@@ -13,7 +13,7 @@ from .observations import Observations
 BLOCK = 1 << 14
 FEW = 256
 SWEEPS = 4
-"""Most steps of one pixel by which a solution spreads."""
+"""Most steps of two pixels by which a solution spreads."""
 CERTAIN = 0.03
 """Uncertainty of a pixel's direction, radians, that halves what its neighbours make of it."""
 DOUBTFUL = 0.5
@@ -57,7 +57,7 @@ def settle_ties(
         trust_rows(X, pixels, *known, np.float32(CERTAIN), flat, lead, trust, start, stop)
 
     run_blocks(weigh, len(pixels), BLOCK, threads=threads, stage="linearize", cancel=cancel)
-    doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
+    listening = doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
     for _ in range(SWEEPS):
         out = np.empty((len(doubtful), 3), np.float32)
         gained = np.empty(len(doubtful), np.float32)
@@ -69,7 +69,7 @@ def settle_ties(
         moved = doubtful[changed]
         flat[:, moved] = out[changed].T
         trust[moved] = np.maximum(trust[moved], gained[changed])
-        doubtful = doubtful[reached_by(moved, doubtful, (H, W))]
+        doubtful = listening[reached_by(moved, listening, (H, W))]
     return flat.reshape(3, H, W)
 
 

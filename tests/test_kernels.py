@@ -209,7 +209,7 @@ def differ(v: Array, w: Array) -> bool:
 
 
 def consensus(
-    x: Array, a: Array, T: Array, tries: Array, limit: int, state: int, guess: Array
+    x: Array, a: Array, T: Array, reach: float, tries: Array, limit: int, state: int, guess: Array
 ) -> tuple[int, Array, int, bool]:
     """Best score and solution for lit observations x (n,) with factors a (n,3), and the margin.
 
@@ -223,7 +223,7 @@ def consensus(
     if np.isfinite(best[0]):
         score, d, misfit = judge(x, a, best, T)
         diffuse = int(d.sum())
-        if d.all() and len(x) > 3:
+        if len(x) > 3 and (np.abs(x - a @ best) <= np.maximum(T * x, f32(reach))).all():
             limit = 0
     drawn = 0
     while drawn < min(limit, tries[diffuse * (len(tries) - 1) // len(x)]):
@@ -319,7 +319,7 @@ def test_consensus_is_the_twins(limit: int, guessed: bool, reach: float) -> None
             assert np.isnan(out[r]).all()
             continue
         state = seed ^ (int(column) * 0xD1342543DE82EF95 % 2**64)
-        s, v, lead, close = consensus(x[lit], A[:, lit].T, T, tries, limit, state, start[r])
+        s, v, lead, close = consensus(x[lit], A[:, lit].T, T, reach, tries, limit, state, start[r])
         assert score[r] == s
         if close:
             settled_by_rounding += 1

@@ -150,10 +150,10 @@ def settle(
     lit = (X[:, p] >= Ts) & (X[:, p] < white)
     x, a = X[lit, p].astype(float), A[:, lit].T.astype(float)
     cost, gained = strange + against(x, a, best), -1.0
-    close = abs(strange - 0.5) < 1e-4 or abs(said.sum() - 1e-3) < 1e-8
-    if said.sum() < 1e-3 or strange < 0.5:
+    close = abs(strange - 0.5) < 1e-4
+    if strange < 0.5:
         return best, gained, close
-    for q in np.argsort(-said)[:8]:
+    for q in np.argsort(-said):
         size = scale(x, a, units[q])
         if size <= 0:
             continue

@@ -43,6 +43,17 @@ def _score(x, a0, a1, a2, n, v, T):  # pragma: no cover
     return diffuse - against, diffuse
 
 
+@njit(nogil=True, cache=True)
+def _explained(x, a0, a1, a2, n, v, T, reach):  # pragma: no cover
+    """Whether all n lit observations are D, or as near to the fit as noise may bring them."""
+    v0, v1, v2 = v[0], v[1], v[2]
+    far = np.int32(0)
+    for m in range(n):
+        excess = x[m] - (a0[m] * v0 + a1[m] * v1 + a2[m] * v2)
+        far += np.int32(abs(excess) > max(T * x[m], reach))
+    return far == 0
+
+
 @njit(nogil=True, cache=True, fastmath=SUMS)
 def _misfit(x, a0, a1, a2, n, v, T):  # pragma: no cover
     """Sum over D of ((i - l) / (T i))^2: settles equal scores."""
@@ -169,7 +180,7 @@ def _differ(v, w):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
-def _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, best):  # pragma: no cover
+def _fit(x, a0, a1, a2, n, T, reach, tries, limit, state, v, w, best):  # pragma: no cover
     """Best v of n lit observations into `best`; returns its score, or UNFIT, and the runner-up's.
 
     `best` holds a first guess, or NaN; v (float32) and w (float64) are scratch, (3,); `tries` as
@@ -185,7 +196,8 @@ def _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, best):  # pragma: no co
     if np.isfinite(best[0]):
         score, diffuse = _score(x, a0, a1, a2, n, best, T)
         misfit = _misfit(x, a0, a1, a2, n, best, T)
-        if diffuse == n and n > 3:
+        # no other candidate could explain more than all
+        if n > 3 and _explained(x, a0, a1, a2, n, best, T, reach):
             return score, second
     drawn = 0
     while drawn < min(limit, tries[diffuse * (len(tries) - 1) // n]):
@@ -224,7 +236,8 @@ def consensus_rows(
         A: (3,M) float32 factors; an observation whose factors are NaN is left out.
         white: (M,) float32; an observation from there on is saturated and left out.
         T, Ts: float32 thresholds.
-        reach: float32, residual from which an observation has no weight in the last fit; 0: none.
+        reach: float32, residual that noise may have, from which an observation has no weight in
+            the last fit; 0: no noise, and no last fit.
         tries: (n,) int64 samples needed against the share of D among the lit, 0 to 1.
         limit: the most samples to draw.
         seed: uint64; each row draws its own sequence from it and its column number.
@@ -254,7 +267,7 @@ def consensus_rows(
             margin[r] = 0
             continue
         state = np.uint64(seed) ^ (np.uint64(column) * np.uint64(0xD1342543DE82EF95))
-        score[r], second = _fit(x, a0, a1, a2, n, T, tries, limit, state, v, w, out[r])
+        score[r], second = _fit(x, a0, a1, a2, n, T, reach, tries, limit, state, v, w, out[r])
         margin[r] = max(0, score[r] - max(second, -n))
         if score[r] == UNFIT:
             out[r] = np.nan

@@ -8,8 +8,6 @@ from .consensus import SINGULAR, _solve
 
 MOST = 24
 """Neighbours of a pixel: a window of 5 x 5 without its centre."""
-TRIED = 8
-"""Neighbours whose solutions are tried, the most trusted ones first."""
 STEPS = 4
 TURN = np.float32(0.3)
 """How much the direction of a solution differs between neighbours, radians; wide, because all it
@@ -22,8 +20,6 @@ SUITS = np.float32(0.5)
 """Disagreement with all neighbours, out of SAY times FAR, below which nothing else is tried."""
 UNCHECKED = np.float32(1e-5)
 """Trust in a solution that fits three observations or fewer: any three fit exactly."""
-LEAST = np.float32(1e-3)
-"""Trust of all neighbours below which they have nothing to say."""
 PASSED_ON = np.float32(0.3)
 """Trust in a solution taken from neighbours, as a share of theirs."""
 BRIGHTER, DARKER = np.float32(3.0), np.float32(8.0)
@@ -150,7 +146,7 @@ def _choose(
     """
     cost = strange + _against(x, a0, a1, a2, n, best, noise)
     changed = False
-    for q in np.argsort(-say[:count])[:TRIED]:
+    for q in np.argsort(-say[:count]):
         size = _scale(x, a0, a1, a2, n, units[q], ratios)
         if size <= 0:
             continue
@@ -196,8 +192,6 @@ def settle_rows(
         for c in range(3):
             out[r, c] = bases[c, p]
         count, total = _meet(p, width, bases, trust, units, say)
-        if total < LEAST:
-            continue
         for q in range(count):
             say[q] *= SAY / max(total, np.float32(1))
         strange = _stranger(units, say, count, out[r])
@@ -205,7 +199,7 @@ def settle_rows(
             continue
         n = 0
         for k in range(K):
-            if Ts <= X[k, p] < white[k]:
+            if X[k, p] >= Ts and 0 < X[k, p] < white[k]:
                 x[n], a0[n], a1[n], a2[n] = X[k, p], A[0, k], A[1, k], A[2, k]
                 n += 1
         if _choose(x, a0, a1, a2, n, units, say, count, noise, strange, v, w, ratios, out[r]):
@@ -242,7 +236,7 @@ def trust_rows(
         for k in range(K):
             x, c0, c1, c2 = X[k, p], A[0, k], A[1, k], A[2, k]
             excess = x - (c0 * b0 + c1 * b1 + c2 * b2)
-            if x >= Ts and x < white[k] and abs(excess) <= 4 * noise:
+            if x >= Ts and 0 < x < white[k] and abs(excess) <= 4 * noise:
                 count += 1
                 g00 += c0 * c0
                 g01 += c0 * c1
