@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from .analysis import Analysis, Cancel, Options
+from .analysis import Analysis, Cancel
 from .errors import OptionError
 from .factors import Thresholds
 from .label import label_images
@@ -23,6 +23,8 @@ ROUNDS = 2
 """Rounds of their refinement: they start nearly right."""
 SAMPLES = 30
 """Most random samples of a pixel: a T far too small would ask for hundreds."""
+SWEEPS = 1
+"""Sweeps of settling ties."""
 REFITS = 3
 """Rounds of refitting the pixels."""
 
@@ -46,7 +48,8 @@ def prepare_ground(stack: ImageStack, seed: int = 0) -> Ground:
 
 
 def follow_thresholds(
-    stack: ImageStack,
+    images: NDArray[np.float32],
+    mask: NDArray[np.bool_],
     ground: Ground,
     near: Analysis,
     thresholds: Thresholds,
@@ -61,21 +64,21 @@ def follow_thresholds(
     but is not the same to the last bit: this is what to show until that is there.
 
     Args:
-        stack: the whole stack of `ground`, or a thinned-out part of it.
+        images, mask: (K,H,W) and (H,W) of the stack of `ground`, or of a thinned-out part of it.
         near: a result of the whole stack for thresholds not far away.
 
     Returns:
-        An analysis of `stack`, without confidence; its only stage is `follow`.
+        An analysis of these pixels, without confidence; its only stage is `follow`.
 
     Raises:
         OptionError: `near` is of another method or number of images.
         DegenerateError: with these thresholds, the images do not determine a solution.
         Cancelled: `cancel` returned true.
     """
-    if near.options.method != "robust" or len(near.coefficients) != len(stack.images):
+    if near.options.method != "robust" or len(near.coefficients) != len(images):
         raise OptionError(
             f"a result by {near.options.method} of {len(near.coefficients)} images cannot be "
-            f"followed for {len(stack.images)}; one by robust of the same images is accepted"
+            f"followed for {len(images)}; one by robust of the same images is accepted"
         )
     start = perf_counter()
     options = replace(near.options, T=thresholds.T, Ts=thresholds.Ts)
@@ -94,8 +97,10 @@ def follow_thresholds(
         c = near.coefficients if ground.lights is not None else relate(found.coefficients, near)
         quality = Quality(ground.white, found.noise.absolute)
         talk = Talk(threads, None, cancel)
-        bases, _ = linearize_robustly(stack, c, thresholds, quick, quality, talk, REFITS)
-    labels = label_images(stack.images, bases, c, stack.mask, thresholds, threads=threads)
+        bases, _ = linearize_robustly(
+            images, mask, c, thresholds, quick, quality, talk, REFITS, SWEEPS
+        )
+    labels = label_images(images, bases, c, mask, thresholds, threads=threads)
     seconds = perf_counter() - start
     return Analysis(
         options=options,
@@ -104,11 +109,11 @@ def follow_thresholds(
         coefficients=c,
         linearized_bases=bases,
         labels=labels,
-        mask=stack.mask,
+        mask=mask,
         names=near.names,
         seconds={"follow": seconds, "total": seconds},
         title=near.title,
-        lights=stack.lights,
+        lights=ground.lights,
         files=near.files,
     )
 

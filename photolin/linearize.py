@@ -52,7 +52,9 @@ def linearize(
     if options.method == "robust":
         known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
         talk = Talk(threads, progress, cancel)
-        return linearize_robustly(stack, coefficients, thresholds, options, known, talk)
+        return linearize_robustly(
+            stack.images, stack.mask, coefficients, thresholds, options, known, talk
+        )
     work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
     return fit_pixels(stack, work, threads, progress, cancel)
 

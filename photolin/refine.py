@@ -141,11 +141,10 @@ def measure_noise(
     if not counted.any():
         return NO_NOISE
     tail = float(np.quantile(short / i, WITHIN))
-    short, i, level = short[counted], i[counted], level[counted]
-    # T i cuts off the noise of dim observations, but not that of bright ones; bright by the fit:
-    # among equally lit pixels the brighter observations are those with less noise below it
+    # FIRST_T i cuts off the noise of dim observations, but not that of bright ones; bright by the
+    # fit: among equally lit pixels the brighter observations are those with less noise below it
     bright = level >= np.median(level)
-    return Noise(half_normal(short / i), half_normal(short[bright]), tail)
+    return Noise(half_normal((short / i)[counted]), half_normal(short[bright]), tail)
 
 
 def half_normal(deviations: NDArray[np.float32]) -> float:

@@ -14,8 +14,7 @@ from .fine import choose_step, fit_fine, thin_out
 from .kernels import consensus_rows
 from .observations import Observations
 from .refit import ROUNDS, find_clear, refit_bases
-from .settle import settle_ties
-from .stack import ImageStack
+from .settle import SWEEPS, settle_ties
 
 BLOCK = 4096
 REACH = 4.0
@@ -54,29 +53,35 @@ class Talk:
 
 
 def linearize_robustly(
-    stack: ImageStack,
+    images: NDArray[np.float32],
+    mask: NDArray[np.bool_],
     coefficients: NDArray[np.float64],
     thresholds: Thresholds,
     options: Options,
     quality: Quality,
     talk: Talk,
     rounds: int = ROUNDS,
+    sweeps: int = SWEEPS,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Linearized bases (3,H,W), NaN where not determined, and margins (P,); see `linearize`."""
+    """Linearized bases (3,H,W), NaN where not determined, and margins (P,); see `linearize`.
+
+    Args:
+        images: (K,H,W)
+        mask: (H,W)
+        rounds, sweeps: fewer make it quicker, and less exact.
+    """
     # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
     q, r = np.linalg.qr(coefficients)
     scale = np.sqrt(len(q) / 3)
     factors = np.ascontiguousarray((q * scale).T, np.float32)
-    X = stack.images.reshape(len(stack.images), -1)
-    some = X[:, stack.pixels[:: max(1, len(stack.pixels) // 1000)]]
+    pixels = np.flatnonzero(mask)
+    some = images.reshape(len(images), -1)[:, pixels[:: max(1, len(pixels) // 1000)]]
     bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
     reach = max(REACH * quality.noise, LEAST_REACH * bright)
-    seen = Observations(
-        stack.images, stack.mask, factors, quality.white, thresholds.Ts, noise, bright
-    )
-    rules = Rules(thresholds.T, reach, options.samples, options.seed, rounds)
-    step = choose_step(len(stack.pixels))
+    seen = Observations(images, mask, factors, quality.white, thresholds.Ts, noise, bright)
+    rules = Rules(thresholds.T, reach, options.samples, options.seed, rounds, sweeps)
+    step = choose_step(len(pixels))
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
     else:
@@ -99,6 +104,8 @@ class Rules:
     """Of all samples."""
     rounds: int = ROUNDS
     """Rounds of `refit_bases`."""
+    sweeps: int = SWEEPS
+    """Sweeps of `settle_ties`."""
 
 
 def fit_together(
@@ -108,7 +115,7 @@ def fit_together(
     pixels = np.flatnonzero(seen.mask)
     bases = np.zeros(seen.images.shape[1:], np.float32)[None].repeat(3, axis=0)
     lead = fit_alone(seen, pixels, rules, bases, talk.part(0, 0.4))
-    settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel)
+    settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel, sweeps=rules.sweeps)
     rest = talk.part(0.4, 1)
     refitted = refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rules.rounds)
     return refitted, lead
@@ -127,7 +134,7 @@ def fit_from_thinned(
     )
     alone = fit_alone(seen, doubtful, rules, bases, talk.part(0.8, 1))
     lead.reshape(-1)[doubtful] = alone
-    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful)
+    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful, rules.sweeps)
     return settled, lead[seen.mask]
 
 

@@ -27,6 +27,7 @@ def settle_ties(
     threads: int | None = None,
     cancel: Cancel | None = None,
     among: NDArray[np.intp] | None = None,
+    sweeps: int = SWEEPS,
 ) -> NDArray[np.float32]:
     """Bases in which doubtful pixels may have taken a neighbour's direction.
 
@@ -40,6 +41,7 @@ def settle_ties(
         bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
         lead: (P,) votes by which the solution of each mask pixel, or of `among`, won.
         among: flat indices of the pixels that may be doubtful; all of the mask when left out.
+        sweeps: how many at most.
 
     Returns:
         (3,H,W); does not depend on threads.
@@ -58,7 +60,7 @@ def settle_ties(
 
     run_blocks(weigh, len(pixels), BLOCK, threads=threads, stage="linearize", cancel=cancel)
     listening = doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
-    for _ in range(SWEEPS):
+    for _ in range(sweeps):
         out = np.empty((len(doubtful), 3), np.float32)
         gained = np.empty(len(doubtful), np.float32)
         work = partial(settle_rows, X, W, doubtful, *known, flat, trust, out, gained)

@@ -5,13 +5,13 @@
 // its image on screen is a similarity, described by {scale, left, top} in CSS pixels.
 "use strict";
 
-window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyId }) => {
+window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyId, viewId }) => {
   window.photolin?.close();
 
   const TRUCK = 2, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
   const NEAREST = 1003; // three.js NearestFilter
   const MARGIN = 0.98, GRID_SCALE = 16, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
-  const HOVER_MS = 50;
+  const HOVER_MS = 50, VIEW_MS = 150;
   const CLICK_PIXELS = 3; // a pointer that moves farther drags
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
@@ -134,6 +134,24 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
       }),
     );
     drawMarks();
+    tellView();
+  }
+
+  let viewed = "", viewTimer = null;
+
+  /** Tell which part of the picture is on screen, "row0,row1,column0,column1,device pixels per pixel". */
+  function tellView() {
+    const { scale, left, top } = similarity();
+    const part = (start, length, count) => [
+      Math.max(0, Math.min(count, Math.floor(-start / scale))),
+      Math.max(0, Math.min(count, Math.ceil((length - start) / scale))),
+    ];
+    const [r, c] = [part(top, canvas.clientHeight, rows), part(left, canvas.clientWidth, columns)];
+    const view = [...r, ...c, (scale * window.devicePixelRatio).toFixed(3)].join(",");
+    if (view === viewed) return;
+    viewed = view;
+    clearTimeout(viewTimer);
+    viewTimer = setTimeout(() => send(viewId, viewed), VIEW_MS);
   }
 
   function configure() {
@@ -333,6 +351,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   function close() {
     closing.abort();
     clearTimeout(hoverTimer);
+    clearTimeout(viewTimer);
     layer.remove();
     style.remove();
     scene.onBeforeRender = () => {};

@@ -11,7 +11,7 @@ import functools
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import viser
@@ -24,6 +24,17 @@ _PLANES = ("/canvas/base", "/canvas/overlay")
 
 Pixel = tuple[int, int]
 """(row, column)."""
+
+
+class Window(NamedTuple):
+    """The part of the picture on screen, half-open."""
+
+    row0: int
+    row1: int
+    column0: int
+    column1: int
+    scale: float
+    """Pixels of the screen for one of the picture."""
 
 
 class Canvas:
@@ -50,8 +61,9 @@ class Canvas:
         )
         # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
         # screens with more than one pixel in it: the page writes them into hidden fields.
-        self._hover, self._pick, self._key = (
-            client.gui.add_text(name, "", visible=False) for name in ("hover", "pick", "key")
+        self._hover, self._pick, self._key, self._view = (
+            client.gui.add_text(name, "", visible=False)
+            for name in ("hover", "pick", "key", "view")
         )
         run_javascript(client, _javascript())
         options = {
@@ -62,6 +74,7 @@ class Canvas:
             "hoverId": widget_id(self._hover),
             "pickId": widget_id(self._pick),
             "keyId": widget_id(self._key),
+            "viewId": widget_id(self._view),
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -116,6 +129,14 @@ class Canvas:
         async def _(_: viser.GuiEvent) -> None:
             callback(pixel_in_text(self._hover.value, self._shape))
 
+    def on_view(self, callback: Callable[[Window], None]) -> None:
+        """Call back with the part of the picture on screen, once it has come to rest."""
+
+        @self._view.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if (window := window_in_text(self._view.value, self._shape)) is not None:
+                callback(window)
+
     def on_key(self, callback: Callable[[str], None]) -> None:
         """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
 
@@ -130,6 +151,17 @@ class Canvas:
     def _send_marks(self) -> None:
         marker = [] if self._marker is None else [(*self._marker, "")]
         call_javascript(self._client, "window.photolin.setMarks", [*self._pins, *marker])
+
+
+def window_in_text(text: str, shape: tuple[int, int]) -> Window | None:
+    """The window that the page wrote as "row0,row1,column0,column1,scale", or None."""
+    found = re.fullmatch(r"([0-9]{1,6}),([0-9]{1,6}),([0-9]{1,6}),([0-9]{1,6}),([0-9.]{1,9})", text)
+    if found is None or found[5].count(".") > 1 or not found[5].strip("."):
+        return None
+    row0, row1, column0, column1 = (int(number) for number in found.groups()[:4])
+    inside = row0 < row1 <= shape[0] and column0 < column1 <= shape[1]
+    scale = float(found[5])
+    return Window(row0, row1, column0, column1, scale) if inside and scale > 0 else None
 
 
 def pixel_in_text(text: str, shape: tuple[int, int]) -> Pixel | None:

@@ -27,6 +27,8 @@ class ViewState:
     """Relative tolerance of i = l, unitless, in (0, 1]."""
     Ts: float = 0.02
     """Shadow level, fraction of full scale, in [0, 1)."""
+    live: bool = True
+    """Linearize again while T or Ts move, where the method is quick enough."""
     opacity: float = 0.55
     """Of the overlay, in [0, 1]."""
     shown: frozenset[Factor] = frozenset(Factor)

@@ -1,0 +1,111 @@
+"""The linearization that follows the sliders: of what the screen shows, until a run catches up."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photolin.analysis import Analysis, Cancel
+from photolin.factors import Thresholds
+from photolin.follow import Ground, follow_thresholds, prepare_ground
+from photolin.stack import ImageStack
+
+from .canvas import Window
+
+MOST_PIXELS = 300_000
+"""Pixels that are linearized at once, about; more are thinned out."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Every `step`-th pixel of some rows and columns, half-open."""
+
+    row0: int
+    row1: int
+    column0: int
+    column1: int
+    step: int
+
+    @property
+    def place(self) -> tuple[slice, slice]:
+        """As an index of rows and columns."""
+        return (
+            slice(self.row0, self.row1, self.step),
+            slice(self.column0, self.column1, self.step),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """A linearization of a part of a stack, for thresholds that no run has caught up with."""
+
+    analysis: Analysis
+    """Of the part alone."""
+    part: Part
+    near: Analysis
+    """The result of the whole stack it was followed from."""
+
+    def whole(self) -> bool:
+        """Whether it holds every pixel of the stack."""
+        return self.part.step == 1 and self.analysis.mask.shape == self.near.mask.shape
+
+    def paint(self, labels: NDArray[np.uint8], image: int) -> NDArray[np.uint8]:
+        """Labels (H,W) of an image with those of the part laid over them."""
+        part, own = self.part, self.analysis.labels[image]
+        rows, columns = part.row1 - part.row0, part.column1 - part.column0
+        wide = own.repeat(part.step, axis=0)[:rows].repeat(part.step, axis=1)[:, :columns]
+        painted = labels.copy()
+        painted[part.row0 : part.row1, part.column0 : part.column1] = wide
+        # a pixel that stands for its neighbours may lie outside the mask, or they
+        outside = painted == np.uint8(255)
+        painted[outside | ~self.near.mask] = labels[outside | ~self.near.mask]
+        return painted
+
+
+class Live:
+    """Follows the thresholds of one tab."""
+
+    def __init__(self, stack: ImageStack) -> None:
+        self._stack = stack
+        self._ground: Ground | None = None
+        self._part: Part | None = None
+        self._cut = (stack.images, stack.mask)
+
+    def follow(
+        self, near: Analysis, thresholds: Thresholds, window: Window | None, cancel: Cancel
+    ) -> Preview:
+        """Linearize what the window shows, at the screen's resolution.
+
+        Raises:
+            DegenerateError: with these thresholds, the images do not determine a solution.
+            Cancelled: `cancel` returned true.
+        """
+        if self._ground is None:
+            self._ground = prepare_ground(self._stack, near.options.seed)
+        part = choose_part(self._stack.shape[1:], window)
+        if part != self._part:
+            self._part, self._cut = part, cut(self._stack, part)
+        found = follow_thresholds(*self._cut, self._ground, near, thresholds, cancel=cancel)
+        return Preview(found, part, near)
+
+
+def choose_part(shape: tuple[int, int], window: Window | None) -> Part:
+    """The part of a picture that is worth linearizing: all of a small one, else what is seen."""
+    H, W = shape
+    if window is None or H * W <= MOST_PIXELS:
+        window = Window(0, H, 0, W, 1.0)
+    row0, row1, column0, column1, scale = window
+    # one pixel for each of the screen, and no more than can be followed
+    step = max(1, int(1 / scale) if scale < 1 else 1)
+    while -(-(row1 - row0) // step) * -(-(column1 - column0) // step) > MOST_PIXELS:
+        step += 1
+    # a moved window keeps the pixels it looks at
+    return Part(row0 // step * step, row1, column0 // step * step, column1, step)
+
+
+def cut(stack: ImageStack, part: Part) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Images and mask of a part, contiguous; those of the stack itself where that is all of it."""
+    if part == Part(0, stack.shape[1], 0, stack.shape[2], 1):
+        return stack.images, stack.mask
+    images = np.ascontiguousarray(stack.images[:, *part.place])
+    return images, np.ascontiguousarray(stack.mask[part.place])
