@@ -11,6 +11,7 @@ from photolin.factors import Thresholds, classify
 from photolin.label import label_images
 from photolin.stack import ImageStack
 
+from .live import Preview
 from .state import ViewState
 
 
@@ -28,6 +29,8 @@ class Frame:
     """(H,W) of the image shown, by the view's thresholds."""
     beside_labels: NDArray[np.uint8] | None
     """The same by the method compared with."""
+    preview: Preview | None = None
+    """What the labels are by, where no run has caught up with the view's thresholds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +45,27 @@ class PixelValues:
     """(K,) Factor codes."""
 
 
-def compose(stack: ImageStack, results: Mapping[Method, Analysis], state: ViewState) -> Frame:
-    """The frame of a view."""
+def compose(
+    stack: ImageStack,
+    results: Mapping[Method, Analysis],
+    state: ViewState,
+    preview: Preview | None = None,
+) -> Frame:
+    """The frame of a view.
+
+    Args:
+        preview: takes the place of the result of the method shown, as far as it goes.
+    """
     analysis = results.get(state.method)
+    if preview is not None and (whole := preview.whole()) is not None:
+        analysis = whole
     beside = results.get(state.beside) if state.beside is not None else None
     labels, beside_labels = (
         None if a is None else _label(stack, a, state) for a in (analysis, beside)
     )
-    return Frame(stack, state, analysis, beside, labels, beside_labels)
+    if preview is not None and analysis is preview.near and labels is not None:
+        labels = preview.paint(labels, state.image)
+    return Frame(stack, state, analysis, beside, labels, beside_labels, preview)
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

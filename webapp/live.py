@@ -1,16 +1,17 @@
 """The linearization that follows the sliders: of what the screen shows, until a run catches up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photolin.analysis import Analysis, Cancel
-from photolin.factors import Thresholds
+from photolin.errors import DegenerateError
 from photolin.follow import Ground, follow_thresholds, prepare_ground
 from photolin.stack import ImageStack
 
 from .canvas import Window
+from .state import ViewState
 
 MOST_PIXELS = 300_000
 """Pixels that are linearized at once, about; more are thinned out."""
@@ -45,9 +46,20 @@ class Preview:
     near: Analysis
     """The result of the whole stack it was followed from."""
 
-    def whole(self) -> bool:
-        """Whether it holds every pixel of the stack."""
-        return self.part.step == 1 and self.analysis.mask.shape == self.near.mask.shape
+    def whole(self) -> Analysis | None:
+        """The result of the whole stack, where every pixel has been followed; None otherwise."""
+        a, near = self.analysis, self.near
+        if self.part.step > 1 or a.mask.shape != near.mask.shape:
+            return None
+        return replace(
+            near,
+            options=a.options,
+            thresholds=a.thresholds,
+            coefficients=a.coefficients,
+            linearized_bases=a.linearized_bases,
+            labels=a.labels,
+            seconds=a.seconds,
+        )
 
     def paint(self, labels: NDArray[np.uint8], image: int) -> NDArray[np.uint8]:
         """Labels (H,W) of an image with those of the part laid over them."""
@@ -63,30 +75,54 @@ class Preview:
 
 
 class Live:
-    """Follows the thresholds of one tab."""
+    """What the sliders of one tab have been followed to."""
 
     def __init__(self, stack: ImageStack) -> None:
         self._stack = stack
         self._ground: Ground | None = None
         self._part: Part | None = None
         self._cut = (stack.images, stack.mask)
+        self._preview: Preview | None = None
 
     def follow(
-        self, near: Analysis, thresholds: Thresholds, window: Window | None, cancel: Cancel
-    ) -> Preview:
-        """Linearize what the window shows, at the screen's resolution.
+        self, state: ViewState, near: Analysis, window: Window | None, cancel: Cancel
+    ) -> Preview | None:
+        """Linearize what the window shows, at the screen's resolution, by the state's thresholds.
+
+        Args:
+            near: the latest result of the whole stack.
+
+        Returns:
+            None where `near` is right already, or the thresholds cannot be followed.
 
         Raises:
-            DegenerateError: with these thresholds, the images do not determine a solution.
             Cancelled: `cancel` returned true.
         """
+        if not is_behind(state, near):
+            self._preview = None
+            return None
+        part = choose_part(self._stack.shape[1:], window)
+        last = self._preview
+        now = (near, part, state.thresholds)
+        if last is not None and (last.near, last.part, last.analysis.thresholds) == now:
+            return last
         if self._ground is None:
             self._ground = prepare_ground(self._stack, near.options.seed)
-        part = choose_part(self._stack.shape[1:], window)
         if part != self._part:
             self._part, self._cut = part, cut(self._stack, part)
-        found = follow_thresholds(*self._cut, self._ground, near, thresholds, cancel=cancel)
-        return Preview(found, part, near)
+        try:
+            found = follow_thresholds(
+                *self._cut, self._ground, near, state.thresholds, cancel=cancel
+            )
+        except DegenerateError:
+            return None
+        self._preview = Preview(found, part, near)
+        return self._preview
+
+
+def is_behind(state: ViewState, near: Analysis) -> bool:
+    """Whether a result is of other thresholds than those shown, and is to follow them."""
+    return state.live and near.options.method == "robust" and near.thresholds != state.thresholds
 
 
 def choose_part(shape: tuple[int, int], window: Window | None) -> Part:

@@ -43,7 +43,8 @@ class Painter:
             Whether the picture on screen is still a lossy one.
         """
         state = frame.state
-        look = (state.image, state.layer, state.gain, frame.analysis)
+        signed = state.layer in ("linearized", "residual")
+        look = (state.image, state.layer, state.gain, frame.analysis if signed else None)
         exact = frame.stack.mask.size <= LARGE or rested
         if self._is_new("picture", *look) or (exact and self._rough):
             picture, self._legend = render_layer(frame)
@@ -64,7 +65,9 @@ class Painter:
         solid = state.layer == "labels"
         hidden = hides_labels(frame)
         look = (state.shown, state.opacity, state.outlines, solid, hidden)
-        if not self._is_new("overlay", state.image, state.thresholds, frame.analysis, look):
+        if not self._is_new(
+            "overlay", state.image, state.thresholds, frame.analysis, frame.preview, look
+        ):
             return
         overlay = None
         if frame.labels is not None and not hidden:

@@ -114,14 +114,31 @@ def legend(labels: NDArray[np.uint8]) -> tuple[LegendRow, ...]:
     )
 
 
-def threshold_status(shown: Thresholds, used: Thresholds | None) -> str:
-    """Whether the linearized bases (computed with `used`) belong to the thresholds shown."""
+def preview_status(thresholds: Thresholds, step: int, whole: bool, seconds: float) -> str:
+    """That a linearization has followed the thresholds, how much of it, and how long it took."""
+    T, Ts = _threshold(thresholds.T), _threshold(thresholds.Ts)
+    each = {1: "every pixel", 2: "every 2nd pixel", 3: "every 3rd pixel"}.get(
+        step, f"every {step}th pixel"
+    )
+    part = "" if whole else f" of {each} on screen"
+    return f"T {T}, Ts {Ts}: preview{part}, linearized in {1000 * seconds:.0f} ms."
+
+
+def threshold_status(
+    shown: Thresholds, used: Thresholds | None, seconds: float | None = None
+) -> str:
+    """Whether the linearized bases (computed with `used`) belong to the thresholds shown.
+
+    Args:
+        seconds: that the linearization took.
+    """
     if used is None:
         return "Nothing is linearized yet."
     T, T_used = _apart(shown.T, used.T)
     Ts, Ts_used = _apart(shown.Ts, used.Ts)
     if shown == used:
-        return f"Labels and linearized bases: T {T}, Ts {Ts}."
+        took = "" if seconds is None else f" Final, linearized in {1000 * seconds:.0f} ms."
+        return f"Labels and linearized bases: T {T}, Ts {Ts}.{took}"
     return (
         f"Labels: T {T}, Ts {Ts}. Linearized bases: T {T_used}, Ts {Ts_used}; "
         "linearize again to match."

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from threading import Event, Thread
+from time import monotonic
 from typing import Literal
 
 import viser
@@ -20,10 +21,12 @@ from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import LETTERS, Thresholds
 
-from .canvas import Canvas, Pixel
+from .canvas import Canvas, Pixel, Window
+from .catch_up import CatchUp
 from .downloads import Pack, make_download, relabel
 from .frame import Frame, compose
 from .job import Job
+from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
 from .state import ViewState
@@ -39,6 +42,8 @@ from .views.thresholds import ThresholdView
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
+PATIENCE = 0.25
+"""Seconds after which a preview gives way to newer thresholds before it is done."""
 FIRST = Thresholds(0.05, 0.02)
 """Where the sliders stand until thresholds are given or suggested."""
 
@@ -66,6 +71,10 @@ class Session:
             self._first = runs.result.thresholds
         self._wake, self._closed = Event(), Event()
         self._job = Job(self._guarded, self._wake.set)
+        self._live = Live(self._stack)
+        self._window: Window | None = None
+        self._catch_up = CatchUp(runs, self._deliver, self._tell, self._wake.set)
+        self._changed = monotonic()
         self._build(client)
         self._wake.set()
         Thread(target=self._work, name="tab", daemon=True).start()
@@ -74,6 +83,7 @@ class Session:
         """Stop all work for the tab."""
         self._closed.set()
         self._job.close()
+        self._catch_up.close()
         self._wake.set()
 
     def _build(self, client: viser.ClientHandle) -> None:
@@ -109,6 +119,7 @@ class Session:
         canvas.on_pick(self._pick)
         canvas.on_hover(self._point)
         canvas.on_key(self._press)
+        canvas.on_view(self._see)
 
     # --- what the user does ---
 
@@ -149,6 +160,10 @@ class Session:
         self._pointer = pixel
         self._wake.set()
 
+    def _see(self, window: Window) -> None:
+        self._window = window
+        self._wake.set()
+
     def _suggest(self) -> None:
         self._begin(self._set_suggested)
 
@@ -169,12 +184,8 @@ class Session:
         self._run.busy(True)
         try:
             work()
-        except Cancelled as error:
-            self._notify("Cancelled", str(error), "gray")
-        except PhotolinError as error:
-            self._notify("This did not work", str(error), "red")
         except Exception as error:
-            self._report(error)
+            self._tell(error)
         finally:
             self._run.busy(False)
 
@@ -188,9 +199,12 @@ class Session:
             result = self._runs.run(options, self._run.progress, self._job.stopping)
         self._declined = frozenset(m for m in self._declined if m != method)
         untouched = not self._results and self._read().thresholds == self._first
-        self._results = {**self._results, method: result}
+        self._deliver(method, result)
         if untouched:
             self._thresholds.set(result.thresholds)
+
+    def _deliver(self, method: Method, result: Analysis) -> None:
+        self._results = {**self._results, method: result}
 
     def _set_suggested(self) -> None:
         with cancelling("suggestion", "T and Ts are kept"):
@@ -212,10 +226,12 @@ class Session:
     def _work(self) -> None:
         rough = False
         while not self._closed.is_set():
-            rested = not self._wake.wait(REST if rough else None)
+            self._wake.wait(max(self._changed + REST - monotonic(), 0.01) if rough else None)
             self._wake.clear()
             try:
-                rough = self._round(rested)
+                rough = self._round()
+            except Cancelled:
+                rough = True  # overtaken by newer thresholds, which are next
             except Exception as error:
                 rough = False
                 self._report(error)
@@ -227,18 +243,37 @@ class Session:
             state = view.read(state)
         return state
 
-    def _round(self, rested: bool) -> bool:
-        """Read all widgets and draw what differs; true when the picture is still rough."""
+    def _round(self) -> bool:
+        """Read all widgets and draw what differs; true when something better is to come."""
         state, results, frame = self._read(), self._results, self._frame
+        if frame is None or state != frame.state:
+            self._changed = monotonic()
+        rested = monotonic() - self._changed >= REST
         self._ensure_results(state, results)
-        if frame is not None and state == frame.state and results is self._shown_results:
-            return self._painter.paint(frame, self._pointer, rested=rested)
-        self._frame = frame = compose(self._stack, results, state)
-        self._shown_results = results
-        rough = self._painter.paint(frame, self._pointer, rested=rested)
-        for view in self._drawers:
-            view.draw(frame)
-        return rough
+        preview = self._follow(state, results)
+        known = frame is not None and state == frame.state and results is self._shown_results
+        if frame is None or not known or preview is not frame.preview:
+            self._frame = frame = compose(self._stack, results, state, preview)
+            self._shown_results = results
+            rough = self._painter.paint(frame, self._pointer, rested=rested)
+            for view in self._drawers:
+                view.draw(frame)
+        else:
+            rough = self._painter.paint(frame, self._pointer, rested=rested)
+        return self._catch_up.pursue(state, results.get(state.method), rested) or rough
+
+    def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
+        """What the thresholds of the view make of what is on screen, where no run is right yet."""
+        near, began = results.get(state.method), monotonic()
+        if near is None:
+            return None
+
+        def overtaken() -> bool:
+            # a step that is nearly done is worth showing: else a moving slider would show nothing
+            late = monotonic() - began > PATIENCE
+            return self._closed.is_set() or (late and self._read().thresholds != state.thresholds)
+
+        return self._live.follow(state, near, self._window, overtaken)
 
     def _ensure_results(self, state: ViewState, results: dict[Method, Analysis]) -> None:
         """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
@@ -253,6 +288,14 @@ class Session:
         if not self._closed.is_set():
             seconds = None if color == "red" else 6
             self._client.add_notification(title, body, auto_close_seconds=seconds, color=color)
+
+    def _tell(self, error: Exception) -> None:
+        if isinstance(error, Cancelled):
+            self._notify("Cancelled", str(error), "gray")
+        elif isinstance(error, PhotolinError):
+            self._notify("This did not work", str(error), "red")
+        else:
+            self._report(error)
 
     def _report(self, error: Exception) -> None:
         """A fault of the program: a short note on screen, the trace in the terminal."""

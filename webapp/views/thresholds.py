@@ -8,7 +8,7 @@ import viser
 from photolin.factors import Thresholds
 
 from ..frame import Frame
-from ..readout import escape, threshold_status
+from ..readout import escape, preview_status, threshold_status
 from ..state import ViewState
 from ..values import clamp_number
 from . import ATTENTION
@@ -48,6 +48,12 @@ class ThresholdView:
             hint="Shadow level, fraction of full scale: darker observations are shadow "
             "(keys: { and })",
         )
+        self._live = gui.add_checkbox(
+            "live",
+            True,
+            hint="Linearize again while T or Ts move: what the screen shows at once (preview), "
+            "everything when they rest (final). By the method robust; off: the labels alone follow",
+        )
         self._status = gui.add_html("")
         self._buttons = gui.add_button_group(
             " ",
@@ -57,7 +63,7 @@ class ThresholdView:
             "the labels follow the sliders (key: R)",
         )
         self.set(initial)
-        for handle in (self._T, self._Ts):
+        for handle in (self._T, self._Ts, self._live):
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
@@ -90,14 +96,20 @@ class ThresholdView:
             clamp_number(handle.value, handle.min, handle.max, fallback)
             for handle, fallback in ((self._T, self._fallback.T), (self._Ts, self._fallback.Ts))
         )
-        return replace(state, T=T, Ts=Ts)
+        return replace(state, T=T, Ts=Ts, live=self._live.value is True)
 
     def draw(self, frame: Frame) -> None:
         """Say what the labels and what the bases were computed with."""
-        used = None if frame.analysis is None else frame.analysis.thresholds
-        shown = frame.state.thresholds
-        stale = "" if used in (None, shown) else ATTENTION
+        shown, preview, result = frame.state.thresholds, frame.preview, frame.analysis
+        if preview is not None:
+            whole, took = preview.whole() is not None, preview.analysis.seconds["total"]
+            text, stale = preview_status(shown, preview.part.step, whole, took), ""
+        elif result is None:
+            text, stale = threshold_status(shown, None), ""
+        else:
+            text = threshold_status(shown, result.thresholds, result.seconds["total"])
+            stale = "" if result.thresholds == shown else ATTENTION
         self._status.content = (
             f'<div style="margin:0 var(--mantine-spacing-xs);font-size:0.8em;{stale}">'
-            f"{escape(threshold_status(shown, used))}</div>"
+            f"{escape(text)}</div>"
         )
