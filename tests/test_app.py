@@ -92,8 +92,8 @@ def picture(image: int, gain: float = 1.0) -> np.ndarray:
 # --- a tab and its widgets ---
 
 
-def enter(page: Any, app: App) -> Session:
-    """Open a tab; its session, once it has drawn something."""
+def enter(page: Any, app: App, *, live: bool = False) -> Session:
+    """Open a tab; its session, once it has drawn something. Without `live`, only labels follow T."""
     page.set_viewport_size({"width": 880, "height": 560})  # software GL is slow
     before = set(app._sessions)
     open_canvas(page, app.server.url)
@@ -103,6 +103,8 @@ def enter(page: Any, app: App) -> Session:
     (number,) = set(app._sessions) - before
     session = app._sessions[number]
     wait_until(lambda: session._frame is not None)
+    session._thresholds._live.value = live
+    wait_until(lambda: session._frame is not None and session._frame.state.live == live)
     return session
 
 
@@ -285,6 +287,97 @@ def test_after_dragging_T_the_last_value_wins_everywhere(page: Any, app: App) ->
     line = page.locator("svg[role=img] line").nth(4)  # l = (1 + T) i, from i = Ts to the border
     x1, y1, x2, y2 = (float(line.get_attribute(name)) for name in ("x1", "y1", "x2", "y2"))
     assert (y1 - y2) / (x2 - x1) == pytest.approx(1 + T.value, abs=1e-3)
+
+
+def test_the_linearization_follows_T_and_ends_in_that_of_a_run(page: Any, app: App) -> None:
+    session = enter(page, app, live=True)
+    wait_for_text(page, "Final, linearized in")
+    for keys in ("[" * 9, "}" * 3):
+        press(page, *keys)
+        state = session._read()
+        wait_until(lambda: session._results["robust"].thresholds == session._read().thresholds)
+        state = session._read()
+        expected = analyze(STACK, replace(OPTIONS, T=state.T, Ts=state.Ts))
+        assert np.array_equal(session._results["robust"].labels, expected.labels)
+        wait_for_colours(page, blended(picture(0), expected.labels[0]), tolerance=1)
+        wait_for_text(
+            page, f"Labels and linearized bases: T {state.T:.4f}, Ts {state.Ts:.4f}. Final"
+        )
+
+
+def test_a_preview_is_shown_and_called_one_until_the_run_is_there(
+    page: Any, open_app: OpenApp, gate: Gate
+) -> None:
+    session = enter(page, open_app(result=RESULT), live=True)
+    press(page, *"[" * 9)
+    wait_for_text(page, "preview, linearized in")
+    wait_until(lambda: len(gate.began) > 0)
+    frame = session._frame
+    assert frame is not None and frame.preview is not None and frame.labels is not None
+    assert frame.preview.analysis.thresholds == session._read().thresholds
+    assert not np.array_equal(frame.labels, labels_at(session))  # other bases, not other T alone
+    wait_for_colours(page, blended(picture(0), frame.labels), tolerance=1)
+    press(page, "]")  # newer thresholds stop the run for older ones
+    wait_until(lambda: gate.cancelled == 1)
+    gate.release.set()
+    wait_for_text(page, "Final, linearized in")
+
+
+def test_files_are_of_a_run_even_while_a_preview_is_shown(
+    page: Any, open_app: OpenApp, gate: Gate
+) -> None:
+    session = enter(page, open_app(result=RESULT), live=True)
+    press(page, *"[" * 9)
+    wait_for_text(page, "preview, linearized in")
+    page.get_by_role("tab", name="Export").click()
+    gate.release.set()
+    _, data = save(page, session, "label maps (indexed PNG, zip)", "all images")
+    state = session._read()
+    expected = analyze(STACK, replace(OPTIONS, T=state.T, Ts=state.Ts))
+    assert np.array_equal(np.stack(unzip(data)), expected.labels)
+
+
+def test_dragging_T_for_five_seconds_shows_linearizations_and_ends_in_the_last(
+    page: Any, open_app: OpenApp, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """24 images of 512 x 512. How many a second is up to the machine, and said, not asserted."""
+    stack = render_scene("sphere_cone", size=(512, 512), images=24).stack
+    first = analyze(stack)
+    app = open_app(stack, result=first)
+    session = enter(page, app, live=True)
+    shown: list[tuple[float, Thresholds, bytes]] = []
+    draw = session._canvas.set_overlay
+
+    def record(encoded: bytes | None) -> None:
+        if encoded is not None:
+            shown.append((time.monotonic(), session._frame.state.thresholds, encoded))
+        draw(encoded)
+
+    session._canvas.set_overlay = record
+    T = session._thresholds._T
+    track, knob = widget(page, T).bounding_box(), thumb(page, T).bounding_box()
+    middle = knob["y"] + knob["height"] / 2
+    page.mouse.move(knob["x"] + knob["width"] / 2, middle)
+    page.mouse.down()
+    end, step = time.monotonic() + DRAG, 0
+    while time.monotonic() < end:
+        step += 1
+        page.mouse.move(track["x"] + track["width"] * (0.1 + abs(step % 40 - 20) / 40), middle)
+        page.wait_for_timeout(20)
+    page.mouse.up()
+    times = np.array([when for when, _, _ in shown])
+    distinct = len({encoded for _, _, encoded in shown})
+    wait_until(lambda: session._results["robust"].thresholds == session._read().thresholds, 30)
+    last = session._read().thresholds
+    expected = analyze(stack, replace(first.options, T=last.T, Ts=last.Ts))
+    found = session._results["robust"]
+    assert np.array_equal(found.labels, expected.labels)
+    assert np.array_equal(found.linearized_bases, expected.linearized_bases, equal_nan=True)
+    wait_until(lambda: shown[-1][2] == encode_labels(expected.labels[0]))
+    assert distinct >= 3
+    stall = np.diff(times).max()
+    with capsys.disabled():
+        print(f"\n{distinct / DRAG:.1f} pictures a second, longest stall {stall:.2f} s")
 
 
 def test_suggested_thresholds_reach_sliders_and_screen(page: Any, app: App) -> None:

@@ -20,7 +20,7 @@ FLOORS = (
     ("load", "synthetic"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine"),
     ("robust", "label", "thresholds"),
-    ("linearize",),
+    ("linearize", "follow"),
     ("saturation", "near_light", "dimensions", "confidence"),
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),

@@ -26,7 +26,7 @@ from .catch_up import CatchUp
 from .downloads import Pack, make_download, relabel
 from .frame import Frame, compose
 from .job import Job
-from .live import Live, Preview
+from .live import Live, Preview, is_behind
 from .painter import Painter
 from .runs import Runs
 from .state import ViewState
@@ -215,6 +215,10 @@ class Session:
         analysis = self._results.get(state.method)
         if analysis is None:
             raise OptionError("there is no result to export yet; linearize first")
+        if is_behind(state, analysis):
+            # what is on screen is a preview: files are of the whole, as a run would give them
+            self._linearize(state.method, state.thresholds)
+            analysis = self._results[state.method]
         self._run.progress("writing files", 0.5)
         shown = relabel(self._stack, analysis, state.thresholds)
         name, data = make_download(shown, kind, None if everything else state.image, self._pack)
