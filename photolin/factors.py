@@ -94,4 +94,7 @@ def classify(i: ArrayLike, l: ArrayLike, thresholds: Thresholds) -> NDArray[np.u
 
 def classifiable(labels: ArrayLike) -> NDArray[np.bool_]:
     """Eq. (4): true for D, A and C; false for S, U and outside the mask."""
-    return np.isin(labels, (Factor.DIFFUSE, Factor.ATTACHED, Factor.CAST))
+    return _CLASSIFIABLE[np.asarray(labels, np.uint8)]
+
+
+_CLASSIFIABLE = np.isin(np.arange(256), (Factor.DIFFUSE, Factor.ATTACHED, Factor.CAST))

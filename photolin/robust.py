@@ -17,6 +17,8 @@ from .refit import ROUNDS, find_clear, refit_bases
 from .settle import SWEEPS, settle_ties
 
 BLOCK = 4096
+TURNED = 1 << 16
+"""Pixels whose bases are brought into the frame of the base images at once."""
 REACH = 4.0
 """Residual, in units of the noise, from which an observation has no weight in the last fit."""
 LEAST_REACH = 0.003
@@ -86,8 +88,10 @@ def linearize_robustly(
         bases, lead = fit_together(seen, rules, talk)
     else:
         bases, lead = fit_from_thinned(seen, step, rules, talk)
-    back = (np.linalg.inv(r) * scale).astype(np.float32)
-    return np.tensordot(back, bases, 1), lead
+    back, flat = (np.linalg.inv(r) * scale).astype(np.float32), bases.reshape(3, -1)
+    for start in range(0, flat.shape[1], TURNED):
+        flat[:, start : start + TURNED] = back @ flat[:, start : start + TURNED]
+    return bases, lead
 
 
 @dataclass(frozen=True)

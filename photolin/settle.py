@@ -29,7 +29,7 @@ def settle_ties(
     among: NDArray[np.intp] | None = None,
     sweeps: int = SWEEPS,
 ) -> NDArray[np.float32]:
-    """Bases in which doubtful pixels may have taken a neighbour's direction.
+    """Let doubtful pixels take a neighbour's direction, in place.
 
     Where a pixel is lit in few images, wrong solutions explain as many observations as the right
     one. Of its own solution and those of its neighbours, rescaled and fitted again, the one wins
@@ -38,19 +38,19 @@ def settle_ties(
     whose direction is uncertain or that won by one vote or none; all others stay as they are.
 
     Args:
-        bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown.
+        bases: (3,H,W) in the frame of `seen.factors`, NaN where unknown; contiguous, changed.
         lead: (P,) votes by which the solution of each mask pixel, or of `among`, won.
         among: flat indices of the pixels that may be doubtful; all of the mask when left out.
         sweeps: how many at most.
 
     Returns:
-        (3,H,W); does not depend on threads.
+        `bases`; what they become does not depend on threads.
 
     Raises:
         Cancelled: `cancel` said so.
     """
     K, H, W = seen.images.shape
-    X, flat = seen.images.reshape(K, -1), bases.reshape(3, -1).copy()
+    X, flat = seen.images.reshape(K, -1), bases.reshape(3, -1)
     pixels = np.flatnonzero(seen.mask) if among is None else among
     known = (seen.factors, seen.white, np.float32(seen.Ts), np.float32(seen.noise))
     trust = (seen.mask & np.isfinite(bases[0])).reshape(-1).astype(np.float32)
@@ -72,7 +72,7 @@ def settle_ties(
         flat[:, moved] = out[changed].T
         trust[moved] = np.maximum(trust[moved], gained[changed])
         doubtful = listening[reached_by(moved, listening, (H, W))]
-    return flat.reshape(3, H, W)
+    return bases
 
 
 def reached_by(

@@ -38,7 +38,7 @@ def sure() -> Array:
 
 
 def settle(seen: Observations, bases: Array, lead: Array, threads: int | None = None) -> Array:
-    return settle_ties(seen, bases, lead[seen.mask], threads)
+    return settle_ties(seen, bases.copy(), lead[seen.mask], threads)
 
 
 def tie(seen: Observations, bases: Array, pixel: tuple[int, int], each: int = 3) -> Array:
@@ -244,7 +244,7 @@ def test_only_pixels_named_doubt_and_all_others_are_trusted() -> None:
     (seen, right), lead = relief(), sure()
     start = spoil(seen, right, lead, [(5, 6), (8, 9)])
     named, votes = np.array([5 * W + 6]), np.zeros(1, np.int32)
-    found = settle_ties(seen, start, votes, among=named)
+    found = settle_ties(seen, start.copy(), votes, among=named)
     np.testing.assert_allclose(found[:, 5, 6], right[:, 5, 6], atol=0.01)
     found[:, 5, 6] = start[:, 5, 6]
     np.testing.assert_array_equal(found, start)

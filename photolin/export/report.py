@@ -55,20 +55,22 @@ def program_version() -> str:
 
 def describe_analysis(analysis: Analysis) -> dict[str, Any]:
     """What report.json says about the analysis itself."""
-    inside = analysis.labels[:, analysis.mask]
-    supported = classifiable(inside)
-    per_pixel = supported.mean(axis=0)
-    images = [
-        {
-            "name": name,
-            "counts": {TITLES[factor]: int((row == factor).sum()) for factor in Factor},
-            "support": float(fitting.mean()),
-        }
-        | describe_confidence(analysis, k)
-        for k, (name, row, fitting) in enumerate(
-            zip(analysis.names, inside, supported, strict=True)
+    # one image after another: all of them at once would be as large as the stack again
+    images, supported = [], np.zeros(int(analysis.mask.sum()), np.int64)
+    for k, name in enumerate(analysis.names):
+        inside = analysis.labels[k][analysis.mask]
+        fitting = classifiable(inside)
+        supported += fitting
+        counts = np.bincount(inside, minlength=256)
+        images.append(
+            {
+                "name": name,
+                "counts": {TITLES[factor]: int(counts[factor]) for factor in Factor},
+                "support": float(fitting.mean()),
+            }
+            | describe_confidence(analysis, k)
         )
-    ]
+    per_pixel = supported / len(analysis.names)
     return {
         "version": program_version(),
         "title": analysis.title,

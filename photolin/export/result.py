@@ -121,12 +121,14 @@ def result_npz(analysis: Analysis) -> bytes:
 
     Numpy dates every entry 1980, so no clock enters the archive.
     """
-    known = analysis.determined()
+    known, bases = analysis.determined(), analysis.linearized_bases
+    if not known[analysis.mask].all():
+        bases = np.where(known, bases, 0)
     arrays = {
         "labels": analysis.labels,
         "coefficients": analysis.coefficients,
         "base_images": analysis.base_images,
-        "linearized_bases": np.where(known, analysis.linearized_bases, 0),
+        "linearized_bases": bases,
         "mask": analysis.mask,
         "determined": known,
         "T": analysis.thresholds.T,
