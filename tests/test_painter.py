@@ -205,3 +205,41 @@ def test_the_pointer_outside_the_mask_reads_the_input_alone() -> None:
     mask[0] = False
     stack = replace(STACK, mask=mask)
     assert describe(frame(stack), (0, 5)).endswith("outside the mask")
+
+
+def test_an_image_gone_back_to_is_not_encoded_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    encoded: list[int] = []
+    encode = module.encode_png
+    monkeypatch.setattr(module, "encode_png", lambda p: (encoded.append(1), encode(p))[1])
+    canvas = FakeCanvas()
+    painter = Painter(canvas)  # pyright: ignore[reportArgumentType]
+    first = None
+    for image in (0, 1, 0, 1, 2, 0):
+        painter.paint(frame(image=image), None, rested=False)
+        base = canvas.take()["base png"]
+        first = base if first is None else first
+        assert np.array_equal(base, render_layer(frame(image=image))[0])
+    assert len(encoded) == 3
+    for image in range(3):  # signed pictures belong to a result, which must not be kept alive
+        painter.paint(frame(image=image, layer="residual"), None, rested=False)
+    assert len(painter._encoded) == 3
+
+
+@pytest.mark.parametrize(
+    ("encoding", "rested", "sent"),
+    [
+        ("quick, then exact", False, "base jpeg"),
+        ("quick, then exact", True, "base png"),
+        ("exact (PNG)", False, "base png"),
+        ("quick (JPEG)", True, "base jpeg"),
+    ],
+)
+def test_a_large_picture_is_sent_as_chosen(
+    monkeypatch: pytest.MonkeyPatch, encoding: str, rested: bool, sent: str
+) -> None:
+    monkeypatch.setattr(module, "LARGE", 10)
+    canvas = FakeCanvas()
+    painter = Painter(canvas)  # pyright: ignore[reportArgumentType]
+    rough = painter.paint(frame(encoding=encoding), None, rested=rested)
+    assert sent in canvas.take()
+    assert rough == (encoding == "quick, then exact" and not rested)

@@ -15,7 +15,12 @@ from .render import (
     render_linearized,
     render_residual,
 )
+from .state import ENCODINGS
 
+SIGNED = ("linearized", "residual")
+"""Layers with colours of their own."""
+KEPT = 32
+"""Encoded pictures kept for stepping back and forth."""
 LARGE = 400_000
 """Pixels above which a picture is first sent as JPEG, and without loss once nothing changes."""
 
@@ -31,6 +36,7 @@ class Painter:
         self._drawn: dict[str, object] = {}
         self._legend = ""
         self._rough = False
+        self._encoded: dict[tuple[object, ...], tuple[bytes, str]] = {}
 
     def paint(self, frame: Frame, pointer: Pixel | None, *, rested: bool) -> bool:
         """Show a frame.
@@ -43,22 +49,32 @@ class Painter:
             Whether the picture on screen is still a lossy one.
         """
         state = frame.state
-        signed = state.layer in ("linearized", "residual")
-        look = (state.image, state.layer, state.gain, frame.analysis if signed else None)
-        exact = frame.stack.mask.size <= LARGE or rested
-        if self._is_new("picture", *look) or (exact and self._rough):
-            picture, self._legend = render_layer(frame)
-            if exact:
-                self._canvas.set_base(encode_png(picture), "png")
-            else:
-                self._canvas.set_base(encode_jpeg(picture), "jpeg")
-            self._rough = not exact
+        result = frame.analysis if state.layer in SIGNED else None
+        look = (state.image, state.layer, state.gain, result)
+        choice = ENCODINGS.index(state.encoding)
+        exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
+        if self._is_new("picture", *look, choice) or (exact and self._rough):
+            encoded, self._legend = self._encode(frame, (*look, exact), exact)
+            self._canvas.set_base(encoded, "png" if exact else "jpeg")
+            self._rough = not exact and choice == 0
         self._paint_overlay(frame)
         if self._is_new("marker", state.pixel):
             self._canvas.set_marker(state.pixel)
         caption = self._legend + (HIDDEN if hides_labels(frame) else "")
         self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
         return self._rough
+
+    def _encode(self, frame: Frame, key: tuple[object, ...], exact: bool) -> tuple[bytes, str]:
+        """Bytes and legend of a picture; an input is encoded once, as long as it is a late one."""
+        found = self._encoded.pop(key, None)
+        if found is None:
+            picture, legend = render_layer(frame)
+            found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
+        if frame.state.layer not in SIGNED:  # of those, results would be kept alive
+            self._encoded[key] = found  # the latest are last
+        for oldest in list(self._encoded)[:-KEPT]:
+            del self._encoded[oldest]
+        return found
 
     def _paint_overlay(self, frame: Frame) -> None:
         state = frame.state
@@ -89,8 +105,7 @@ def hides_labels(frame: Frame) -> bool:
     Outlines leave enough of it to be seen.
     """
     state = frame.state
-    signed = state.layer in ("linearized", "residual")
-    return signed and frame.labels is not None and not state.outlines
+    return state.layer in SIGNED and frame.labels is not None and not state.outlines
 
 
 def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:

@@ -9,6 +9,8 @@ from photolin.factors import Factor, Thresholds
 
 Layer = Literal["input", "linearized", "residual", "labels"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
+Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
+ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class ViewState:
     """(row, column) of the selected pixel."""
     gain: float | None = None
     """Display factor of input images, above 0; None means chosen from the stack."""
+    encoding: Encoding = ENCODINGS[0]
+    """How the picture under the overlay is sent; small ones are exact unless JPEG is asked for."""
 
     def __post_init__(self) -> None:
         Thresholds(self.T, self.Ts)
@@ -50,6 +54,8 @@ class ViewState:
             raise OptionError(f"method is {self.method!r}; accepted are {', '.join(METHODS)}")
         if self.beside is not None and self.beside not in METHODS:
             raise OptionError(f"beside is {self.beside!r}; accepted are {', '.join(METHODS)}")
+        if self.encoding not in ENCODINGS:
+            raise OptionError(f"encoding is {self.encoding!r}; accepted are {'; '.join(ENCODINGS)}")
         if not 0 <= self.opacity <= 1:
             raise OptionError(f"opacity is {self.opacity:g}; accepted is 0 to 1")
         if self.gain is not None and not 0 < self.gain < float("inf"):

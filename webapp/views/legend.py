@@ -9,8 +9,8 @@ from photolin.factors import LETTERS, TITLES, Factor
 from photolin.stack import ImageStack
 
 from ..render import choose_gain
-from ..state import ViewState
-from ..values import clamp_number
+from ..state import ENCODINGS, ViewState
+from ..values import choose_option, clamp_number
 
 MIN_GAIN, MAX_GAIN = 0.5, 20.0
 
@@ -52,7 +52,15 @@ class LegendView:
             marks=(),
             hint="Factor for showing the input; stored values are not changed",
         )
-        for handle in (*self._switches.values(), self._opacity, self._outlines, self._gain):
+        self._encoding = gui.add_dropdown(
+            "Sent as",
+            ENCODINGS,
+            initial_value=ENCODINGS[0],
+            hint="How the picture travels to the browser: JPEG is quicker over slow connections, "
+            "PNG shows every grey value as it is; labels are always exact",
+        )
+        looks = (self._opacity, self._outlines, self._gain, self._encoding)
+        for handle in (*self._switches.values(), *looks):
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
@@ -70,4 +78,5 @@ class LegendView:
             opacity=clamp_number(self._opacity.value, 0, 1, 0.55),
             outlines=self._outlines.value is True,
             gain=clamp_number(self._gain.value, MIN_GAIN, MAX_GAIN, self._first_gain),
+            encoding=choose_option(self._encoding.value, ENCODINGS, ENCODINGS[0]),
         )
