@@ -14,7 +14,7 @@ from .near_light import WORTH, Regions
 from .stack import ImageStack
 
 BLOCK = 1 << 13
-JUDGES = 6000
+JUDGES = 4000
 """Pixels that judge an image, about."""
 FEW = 4
 """Lit images below which three observations fit whatever they are."""

@@ -8,7 +8,7 @@ from there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,11 @@ class Factorization:
     """D - U over all sampled pixels and images."""
     noise: Noise = NO_NOISE
     """What is left below the fit, where it was measured."""
+
+    def thin(self, count: int) -> "Factorization":
+        """With the bases of the pixels that `Sample.thin` keeps."""
+        step = max(1, self.bases.shape[1] // count)
+        return replace(self, bases=np.ascontiguousarray(self.bases[:, ::step]))
 
 
 def search_coefficients(

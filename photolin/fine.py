@@ -16,17 +16,18 @@ from .blocks import run_blocks
 from .kernels import fine_band
 from .observations import Observations
 
-COARSE_PIXELS = 20_000
-"""Mask pixels that a thinned-out picture has, about."""
+COARSE_PIXELS, FEWEST_PIXELS = 20_000, 10_000
+"""Mask pixels that a thinned-out picture has, about, with up to 24 images and with many."""
 COLUMNS = 512
 """Columns that are worked on at once, about; what is summed up for them stays in the cache."""
 WIDE = 4.0
 """Residual, in units of the noise, that noise may have."""
 
 
-def choose_step(pixels: int) -> int:
+def choose_step(pixels: int, images: int = 24) -> int:
     """Side of the blocks of pixels that one stands for; 1: all are looked at."""
-    return max(1, round(np.sqrt(pixels / COARSE_PIXELS)))
+    coarse = np.clip(COARSE_PIXELS * 24 / images, min(FEWEST_PIXELS, COARSE_PIXELS), COARSE_PIXELS)
+    return max(1, round(np.sqrt(pixels / coarse)))
 
 
 def thin_out(seen: Observations, step: int) -> Observations:

@@ -49,8 +49,7 @@ def compare_regions(
     weights = weigh(
         sample, found.coefficients, found.bases, everywhere, tolerance, thresholds.Ts, width
     )
-    weights, X = weights[::2], sample.pixels[::2]  # half of them tell as much
-    rows, columns = rows[::2], columns[::2]
+    X = sample.pixels
     place = (rows > np.median(rows)) * 2 + (columns > np.median(columns))
     telling = place[weights.any(axis=1)]
     if np.bincount(telling, minlength=4).min() < LEAST_PIXELS:

@@ -24,6 +24,9 @@ from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_thresholds
 
+DOUBTED_PIXELS = 2000
+"""Sampled pixels that tell whether the stack is one of three dimensions and distant lights."""
+
 
 class Talk(NamedTuple):
     """How a run is worked on and watched; nothing of it changes the result."""
@@ -176,9 +179,12 @@ def doubt_lights(
     """Whether lights found in the sample lie in a plane, or any are near."""
     if found is None:
         return []
-    plane = fit_plane(sample, found, thresholds) if stack.lights is None else None
-    rows, columns = np.divmod(choose_pixels(stack, options.seed), stack.shape[2])
-    regions = compare_regions(sample, rows, columns, found, thresholds)
+    few, known = sample.thin(DOUBTED_PIXELS), found.thin(DOUBTED_PIXELS)
+    plane = fit_plane(few, known, thresholds) if stack.lights is None else None
+    pixels = choose_pixels(stack, options.seed)
+    pixels = pixels[:: max(1, len(pixels) // DOUBTED_PIXELS)]
+    rows, columns = np.divmod(pixels, stack.shape[2])
+    regions = compare_regions(few, rows, columns, known, thresholds)
     # where one dimension is noise, it differs between parts of the picture too
     return doubt_dimensions(plane) or doubt_distance(regions)
 

@@ -37,13 +37,15 @@ LAST_WIDTH = 5e-4
 ROUNDS = 12
 EARLY = 4
 """Rounds on the smallest part of the sample: far from the noise, more pixels tell no more."""
-MORE_PIXELS = 4000
+MORE_PIXELS = 2000
 """Pixels from then on, until the coefficients are still."""
 LATE = 2
 """Rounds on the whole sample, if they are not still before."""
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
 DAMPING = 1e-6
+NOISE_OBSERVATIONS = 120_000
+"""Observations from which noise is read, at least."""
 HESSIAN_PIXELS = 800
 """Pixels that say how the coefficients depend on each other, at least."""
 
@@ -128,6 +130,8 @@ def measure_noise(
         coefficients: (K,3)
         bases: (3,M), NaN where unknown.
     """
+    step = max(1, images.size // NOISE_OBSERVATIONS)
+    images, bases = images[:, ::step], bases[:, ::step]
     l = coefficients.astype(np.float32) @ bases
     with np.errstate(invalid="ignore"):
         short = l - images

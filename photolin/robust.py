@@ -83,7 +83,7 @@ def linearize_robustly(
     reach = max(REACH * quality.noise, LEAST_REACH * bright)
     seen = Observations(images, mask, factors, quality.white, thresholds.Ts, noise, bright)
     rules = Rules(thresholds.T, reach, options.samples, options.seed, rounds, sweeps)
-    step = choose_step(len(pixels))
+    step = choose_step(len(pixels), len(images))
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
     else:
