@@ -37,8 +37,9 @@ def run_blocks(
         if cancel is None or not cancel():
             work(*span)
 
-    if len(ranges) == 1:
-        run(ranges[0])
+    if len(ranges) <= 1:
+        for span in ranges:
+            run(span)
         if progress is not None:
             progress(stage, 1.0)
     else:

@@ -46,7 +46,7 @@ def thin_out(seen: Observations, step: int) -> Observations:
     at = np.where(blocks[:, :, centre], centre, blocks.argmax(axis=2))
     rows = np.minimum(np.arange(h)[:, None] * step + at // step, H - 1)
     columns = np.minimum(np.arange(w)[None, :] * step + at % step, W - 1)
-    images = seen.images.reshape(K, -1)[:, rows * W + columns]
+    images = np.ascontiguousarray(seen.images.reshape(K, -1)[:, rows * W + columns])
     return replace(seen, images=images, mask=blocks.any(axis=2))
 
 

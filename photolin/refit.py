@@ -30,6 +30,8 @@ LEAST = 5e-4
 STILL = 0.1
 """Change of a pixel, in units of the noise, from which its surroundings are fitted once more."""
 GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
+LIT, ENOUGH = 12, 50
+"""Lit pixels that a window has to have more of to be measured, and windows needed."""
 PATCHES, PATCH = 40, 12
 """Squares of pixels in which the noise of means is measured."""
 
@@ -121,7 +123,7 @@ def find_clear(
 
 def widest(seen: Observations) -> float:
     """Residual beyond which one observation is out by itself, fraction of full scale."""
-    return CAP * seen.bright + CAP_NOISE * seen.noise
+    return max(CAP * seen.bright + CAP_NOISE * seen.noise, 1e-30)
 
 
 def fit_tiles(
@@ -170,12 +172,13 @@ def measure_means(
 ) -> float:
     """Standard deviation of the mean residual of a full 5 x 5 window, fraction of full scale.
 
-    From the negative ones, in squares spread over the object; 0 where there are none.
+    From the negative ones, in squares spread over the object; that of independent observations
+    where windows are too few.
     """
     H, W = usable.shape
     pixels = np.flatnonzero(usable)
     if not pixels.size:
-        return 0.0
+        return seen.noise / 5
     # multiples of an irrational number: no step that rows of the picture could be in tune with
     spread = np.arange(PATCHES) * GOLDEN_RATIO % 1
     rows, columns = (
@@ -190,10 +193,12 @@ def measure_means(
     lit &= usable[place] & inside
     near = np.where(lit, np.clip(x - l, -cap, cap), 0)
     sums, counts = window_sums(near), window_sums(lit.astype(np.float32))
-    inner = (counts > 12) & lit[:, :, 2:-2, 2:-2]
+    inner = (counts > LIT) & lit[:, :, 2:-2, 2:-2]
     means = sums[inner] / np.sqrt(25 * counts[inner])
     below = means[means < 0]
-    return float(np.median(-below) / 0.6745) if below.size else 0.0
+    if below.size < ENOUGH:  # an object one pixel wide has no full windows
+        return seen.noise / 5
+    return float(np.median(-below) / 0.6745)
 
 
 def window_sums(values: NDArray[np.float32]) -> NDArray[np.float32]:

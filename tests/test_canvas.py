@@ -22,7 +22,7 @@ from browser import (
 )
 
 from webapp.access import Server, open_server
-from webapp.canvas import Canvas, pixel_in_text
+from webapp.canvas import Canvas, Window, pixel_in_text, window_in_text
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -31,6 +31,48 @@ pytestmark = pytest.mark.filterwarnings("error")
 def test_a_text_that_names_no_pixel_is_none(text: str) -> None:
     assert pixel_in_text(text, (60, 80)) is None
     assert pixel_in_text("59,79", (60, 80)) == (59, 79)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "0,60,0,80",
+        "0,60,0,80,1,1",
+        "0,61,0,80,1",
+        "0,60,0,81,1",
+        "5,5,0,80,1",
+        "6,5,0,80,1",
+        "0,60,80,80,1",
+        "-1,60,0,80,1",
+        "0,60,0,80,0",
+        "0,60,0,80,0.000",
+        "0,60,0,80,.",
+        "0,60,0,80,1.2.3",
+        "0,60,0,80,-1",
+        "0,60,0,80,nan",
+        "0,60,0,80,1e9",
+        "0,60,0,80,1\n",
+        " 0,60,0,80,1",
+        "0,60,0,80,٣",
+        "0,60,0,80," + "9" * 4000,
+        "9" * 4000,
+    ],
+)
+def test_a_text_that_is_no_part_of_the_picture_is_no_window(text: str) -> None:
+    assert window_in_text(text, (60, 80)) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "window"),
+    [
+        ("0,60,0,80,11.163", Window(0, 60, 0, 80, 11.163)),
+        ("59,60,79,80,0.001", Window(59, 60, 79, 80, 0.001)),
+        ("7,12,3,80,20", Window(7, 12, 3, 80, 20.0)),
+    ],
+)
+def test_a_window_is_read_as_the_page_writes_it(text: str, window: Window) -> None:
+    assert window_in_text(text, (60, 80)) == window
 
 
 def test_the_script_of_the_canvas_is_part_of_the_package() -> None:
@@ -51,6 +93,7 @@ class Stage:
     picks: list[tuple[int, int]] = field(default_factory=list)
     hovers: list[tuple[int, int] | None] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
+    windows: list[Window] = field(default_factory=list)
     connected: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
 
     def connect(self, client: viser.ClientHandle) -> None:
@@ -59,6 +102,7 @@ class Stage:
         self.canvas.on_pick(self.picks.append)
         self.canvas.on_hover(self.hovers.append)
         self.canvas.on_key(self.keys.append)
+        self.canvas.on_view(self.windows.append)
         self.slider = client.gui.add_slider("T", 0.0, 1.0, 0.01, 0.5)
         client.gui.add_text("Note", "")
         self.connected.release()
@@ -253,3 +297,40 @@ def test_a_tab_that_lost_its_connection_gets_a_working_canvas_again(
     wait_until(lambda: stage.picks == [(5, 70)])
     page.keyboard.press("]")
     wait_until(lambda: stage.keys == ["]"])
+
+
+def window_on_screen(page: Any, shape: tuple[int, int]) -> Window:
+    """What the page should report: every pixel of the picture of which something is in view."""
+    scale, left, top = similarity(page)
+    width = page.evaluate("window.__viserMutable.canvas.clientWidth")
+    edges = [-top / scale, (900 - top) / scale, -left / scale, (width - left) / scale]
+    row0, column0 = (max(int(np.floor(edge)), 0) for edge in edges[::2])
+    row1, column1 = (min(int(np.ceil(e)), n) for e, n in zip(edges[1::2], shape, strict=True))
+    return Window(row0, row1, column0, column1, pytest.approx(scale, abs=0.001))
+
+
+@pytest.mark.browser
+def test_the_page_reports_which_part_of_the_picture_is_in_view(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(300, 400)
+    wait_until(lambda: stage.windows[-1:] == [window_on_screen(page, (300, 400))])
+    assert stage.windows[-1][:4] == (0, 300, 0, 400)
+
+    page.mouse.move(400, 300)
+    for _ in range(4):
+        page.mouse.wheel(0, -400)
+    wait_until(lambda: stage.windows[-1] == window_on_screen(page, (300, 400)))
+    zoomed = stage.windows[-1]
+    assert 0 < zoomed.row0 < zoomed.row1 < 300
+    assert 0 < zoomed.column0 < zoomed.column1 < 400
+
+    page.mouse.down()
+    page.mouse.move(300, 250, steps=4)
+    page.mouse.up()
+    wait_until(lambda: stage.windows[-1] == window_on_screen(page, (300, 400)))
+    assert stage.windows[-1].row0 > zoomed.row0
+    assert stage.windows[-1].column0 > zoomed.column0
+
+    stage.canvas.fit()
+    wait_until(lambda: stage.windows[-1][:4] == (0, 300, 0, 400))

@@ -7,10 +7,12 @@ import pytest
 
 from photolin.analysis import Options
 from photolin.factors import OUTSIDE, Factor, Thresholds
+from photolin.follow import follow_thresholds, prepare_ground
 from photolin.label import label_images
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import compose, pixel_values
+from webapp.live import Part, Preview, cut
 from webapp.state import ViewState
 
 FULL = render_scene("sphere_cone", size=(24, 32), images=8).stack
@@ -95,3 +97,48 @@ def test_an_undetermined_pixel_is_undefined_in_all_images() -> None:
     values = pixel_values(STACK, unknown, (9, 9), Thresholds(0.05, 0.02))
     assert np.isnan(values.l).all()
     assert (values.labels == Factor.UNDEFINED).all()
+
+
+def preview_of(part: Part, thresholds: Thresholds) -> Preview:
+    known = (*cut(STACK, part), prepare_ground(STACK), ROBUST, thresholds)
+    return Preview(follow_thresholds(*known), part, ROBUST)
+
+
+def test_a_preview_of_all_pixels_takes_the_place_of_the_result() -> None:
+    state = ViewState(image=3, T=0.2, Ts=0.05, beside="statistical")
+    preview = preview_of(Part(0, 24, 0, 32, 1), state.thresholds)
+    frame = compose(STACK, RESULTS, state, preview)
+    assert frame.preview is preview
+    assert frame.analysis is not None
+    assert frame.analysis.thresholds == state.thresholds
+    assert frame.analysis.linearized_bases is preview.analysis.linearized_bases
+    assert np.array_equal(frame.labels, preview.analysis.labels[3])
+    without = compose(STACK, RESULTS, state)
+    assert not np.array_equal(frame.labels, without.labels)
+    assert frame.beside is OTHER
+    assert np.array_equal(frame.beside_labels, without.beside_labels)
+    assert without.preview is None
+
+
+def test_a_preview_of_a_part_is_laid_over_the_labels_of_the_result() -> None:
+    state = ViewState(image=3, T=0.2, Ts=0.05)
+    preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
+    frame, without = (compose(STACK, RESULTS, state, shown) for shown in (preview, None))
+    assert (frame.analysis, frame.preview) == (ROBUST, preview)
+    assert frame.labels is not None
+    assert without.labels is not None
+    assert np.array_equal(frame.labels, preview.paint(without.labels, 3))
+    assert np.array_equal(frame.labels[6:20:2, 4:30:2], preview.analysis.labels[3])
+    beyond = np.ones(STACK.mask.shape, bool)
+    beyond[6:20, 4:30] = False
+    assert np.array_equal(frame.labels[beyond], without.labels[beyond])
+    assert not np.array_equal(frame.labels, without.labels)
+
+
+def test_a_preview_of_a_part_is_not_laid_over_another_result() -> None:
+    state = ViewState(image=3, T=0.2, Ts=0.05)
+    preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
+    newer = replace(ROBUST)
+    frame = compose(STACK, {"robust": newer}, state, preview)
+    assert frame.analysis is newer
+    assert np.array_equal(frame.labels, compose(STACK, RESULTS, state).labels)

@@ -13,6 +13,7 @@ from webapp.readout import (
     escape,
     explain,
     legend,
+    preview_status,
     status_line,
     summarize,
     threshold_status,
@@ -207,3 +208,34 @@ def test_escaped_text_reads_the_same_and_holds_no_markup(name):
 
 def test_a_file_name_that_is_not_unicode_can_be_sent():
     assert escape("\udcff.png").encode() == b"&#56575;&#46;png"
+
+
+@pytest.mark.parametrize(
+    ("step", "whole", "said"),
+    [
+        (1, True, "preview, linearized in 41 ms."),
+        (1, False, "preview of every pixel on screen, linearized in 41 ms."),
+        (2, False, "preview of every 2nd pixel on screen, linearized in 41 ms."),
+        (3, False, "preview of every 3rd pixel on screen, linearized in 41 ms."),
+        (4, False, "preview of every 4th pixel on screen, linearized in 41 ms."),
+        (12, False, "preview of every 12th pixel on screen, linearized in 41 ms."),
+    ],
+)
+def test_a_preview_says_of_how_much_it_is_and_how_long_it_took(step, whole, said):
+    assert preview_status(THRESHOLDS, step, whole, 0.0412) == f"T 0.0500, Ts 0.0200: {said}"
+
+
+def test_a_preview_tells_thresholds_and_time_as_they_are():
+    text = preview_status(Thresholds(0.1234, 1e-6), 1, True, 1.25)
+    assert text == "T 0.1234, Ts 1.0e-06: preview, linearized in 1250 ms."
+
+
+def test_the_time_of_a_final_result_is_told_with_its_own_thresholds_only():
+    text = "Labels and linearized bases: T 0.0500, Ts 0.0200."
+    assert threshold_status(THRESHOLDS, THRESHOLDS, 0.3519) == (
+        f"{text} Final, linearized in 352 ms."
+    )
+    assert threshold_status(THRESHOLDS, THRESHOLDS, None) == text
+    other = Thresholds(0.06, 0.02)
+    assert threshold_status(other, THRESHOLDS, 0.35) == threshold_status(other, THRESHOLDS)
+    assert threshold_status(THRESHOLDS, None, 0.35) == "Nothing is linearized yet."
