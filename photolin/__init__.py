@@ -19,6 +19,7 @@ from .load import LoadOptions, load_stack
 from .pipeline import analyze
 from .stack import ImageStack
 from .synthetic import load_truth, render_scene
+from .thresholds import suggest_thresholds
 
 __all__ = [
     "OUTSIDE",
@@ -38,4 +39,5 @@ __all__ = [
     "load_truth",
     "render_scene",
     "save_result",
+    "suggest_thresholds",
 ]

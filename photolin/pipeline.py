@@ -22,7 +22,7 @@ from .near_light import compare_regions
 from .sample import Sample, choose_pixels, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
-from .thresholds import Suggestion, suggest_thresholds
+from .thresholds import Suggestion, suggest_from_sample
 
 DOUBTED_PIXELS = 2000
 """Sampled pixels that tell whether the stack is one of three dimensions and distant lights."""
@@ -73,7 +73,7 @@ def run_stages(stack: ImageStack, options: Options, talk: Talk) -> Analysis:
     with timed("thresholds", seconds, talk.progress):
         white = find_white(stack)
         sample = draw_sample(stack, options.seed, white)
-        suggestion = suggest_thresholds(sample, options, stack.lights, talk.cancel)
+        suggestion = suggest_from_sample(sample, options, stack.lights, talk.cancel)
     thresholds, base_images = suggestion.thresholds, suggestion.starts[0]
     found = suggestion.found
     quality = Quality(white, 0.0 if found is None else found.noise.absolute)

@@ -17,7 +17,9 @@ from .factorize import (
 )
 from .factors import Thresholds
 from .refine import follow_noise, measure_noise, refine_coefficients
-from .sample import Sample
+from .sample import Sample, draw_sample
+from .saturation import find_white
+from .stack import ImageStack
 
 FIRST_T = 0.05
 LEVELS = 256
@@ -53,12 +55,26 @@ class Suggestion:
 
 
 def suggest_thresholds(
+    stack: ImageStack, options: Options | None = None, cancel: Cancel | None = None
+) -> Suggestion:
+    """Thresholds for a stack, with the evidence; T or Ts given in `options` are kept.
+
+    Raises:
+        DegenerateError: the images do not determine coefficients.
+        Cancelled: `cancel` returned true.
+    """
+    options = options or Options()
+    sample = draw_sample(stack, options.seed, find_white(stack))
+    return suggest_from_sample(sample, options, stack.lights, cancel)
+
+
+def suggest_from_sample(
     sample: Sample,
     options: Options,
     lights: NDArray[np.float64] | None = None,
     cancel: Cancel | None = None,
 ) -> Suggestion:
-    """Thresholds for a stack; T or Ts given in `options` are kept.
+    """Thresholds for the stack of a sample; T or Ts given in `options` are kept.
 
     Ts is where the dark mode of the histogram has fallen to the level of the grays above it. T lets
     pass all but the tail of the residuals seen below the fit (i < l), where highlights cannot be,

@@ -291,7 +291,7 @@ def test_after_dragging_T_the_last_value_wins_everywhere(page: Any, app: App) ->
 
 def test_the_linearization_follows_T_and_ends_in_that_of_a_run(page: Any, app: App) -> None:
     session = enter(page, app, live=True)
-    wait_for_text(page, "Final, linearized in")
+    wait_for_text(page, "final, linearized in")
     for keys in ("[" * 9, "}" * 3):
         press(page, *keys)
         state = session._read()
@@ -300,9 +300,7 @@ def test_the_linearization_follows_T_and_ends_in_that_of_a_run(page: Any, app: A
         expected = analyze(STACK, replace(OPTIONS, T=state.T, Ts=state.Ts))
         assert np.array_equal(session._results["robust"].labels, expected.labels)
         wait_for_colours(page, blended(picture(0), expected.labels[0]), tolerance=1)
-        wait_for_text(
-            page, f"Labels and linearized bases: T {state.T:.4f}, Ts {state.Ts:.4f}. Final"
-        )
+        wait_for_text(page, f"T {state.T:.4f}, Ts {state.Ts:.4f}: final")
 
 
 def test_a_preview_is_shown_and_called_one_until_the_run_is_there(
@@ -320,7 +318,7 @@ def test_a_preview_is_shown_and_called_one_until_the_run_is_there(
     press(page, "]")  # newer thresholds stop the run for older ones
     wait_until(lambda: gate.cancelled == 1)
     gate.release.set()
-    wait_for_text(page, "Final, linearized in")
+    wait_for_text(page, "final, linearized in")
 
 
 def test_files_are_of_a_run_even_while_a_preview_is_shown(
@@ -726,7 +724,7 @@ def test_linearizing_again_can_be_cancelled_and_says_what_the_bases_belong_to(
     page: Any, open_app: OpenApp, gate: Gate
 ) -> None:
     session = enter(page, open_app(result=RESULT))
-    wait_for_text(page, "Labels and linearized bases: T 0.0500, Ts 0.0200.")
+    wait_for_text(page, "T 0.0500, Ts 0.0200: final")
     press(page, *"]" * 8)
     wait_until(lambda: session._read().T > 0.09)
     T = session._read().T
@@ -746,7 +744,7 @@ def test_linearizing_again_can_be_cancelled_and_says_what_the_bases_belong_to(
     gate.release.set()
     leave_widgets(page)
     press(page, "r")
-    wait_for_text(page, f"Labels and linearized bases: T {T:.4f}, Ts 0.0200.")
+    wait_for_text(page, f"T {T:.4f}, Ts 0.0200: final")
     expected = replace(OPTIONS, T=T, Ts=0.02)
     assert gate.began == [expected, expected]
     result = analyze(STACK, expected)

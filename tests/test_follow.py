@@ -1,18 +1,36 @@
 """Other thresholds from a result nearby: nearly what a run finds, in the whole and in parts."""
 
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
+from photolin import follow as module
 from photolin.analysis import Analysis, Options
 from photolin.errors import Cancelled, DegenerateError, OptionError
+from photolin.factorize import orthogonalize
 from photolin.factors import OUTSIDE, Thresholds
-from photolin.follow import PIXELS, SAMPLES, Ground, follow_thresholds, prepare_ground, relate
+from photolin.follow import (
+    PIXELS,
+    REFITS,
+    SAMPLES,
+    SWEEPS,
+    Ground,
+    follow_thresholds,
+    prepare_ground,
+    relate,
+)
 from photolin.label import label_images
+from photolin.observations import Observations
 from photolin.pipeline import analyze
+from photolin.refine import refine_coefficients
+from photolin.refit import refit_bases
+from photolin.robust import linearize_robustly
 from photolin.sample import draw_sample
 from photolin.saturation import find_white
+from photolin.settle import settle_ties
 from photolin.synthetic import render_scene
 
 Array = np.ndarray
@@ -176,6 +194,72 @@ def test_a_part_with_little_or_nothing_in_the_mask_is_followed(inside: int) -> N
     assert (found.linearized_bases[:, ~mask] == 0).all()
     lit = (STACK.images >= OTHER.Ts).sum(axis=0)
     np.testing.assert_array_equal(found.determined(), mask & (lit >= 3))
+
+
+# Fewer rounds and sweeps
+
+
+@pytest.mark.parametrize("rounds", [1, 2, 3])
+def test_coefficients_nearly_right_take_as_few_rounds_as_asked_for(rounds: int) -> None:
+    """The last round is on the whole sample, at the width of the noise."""
+    asked: list[int] = []
+    known = (GROUND.sample, NEAR.coefficients, OTHER.T, OTHER.Ts, 0, SAMPLES)
+    found = refine_coefficients(*known, lambda: bool(asked.append(1)), rounds)
+    assert len(asked) == rounds
+    assert found.bases.shape == (3, PIXELS)
+    np.testing.assert_allclose(relate(found.coefficients, NEAR), NEAR.coefficients, atol=2e-3)
+
+
+def observations() -> tuple[Observations, Array]:
+    """Those of the scene with noise, and bases of each pixel by itself that hold highlights."""
+    factors = np.ascontiguousarray(orthogonalize(SCENE.truth.lights).T, np.float32)
+    more = np.random.default_rng(0).normal(0, 0.002, STACK.images.shape)
+    images = np.clip(STACK.images + more, 0, 1).astype(np.float32)
+    seen = Observations(images, STACK.mask, factors, GROUND.white, 0.02, 0.003, 0.9)
+    bases = np.linalg.lstsq(factors.T, SCENE.truth.ideal.reshape(10, -1))[0] * 1.01
+    return seen, bases.reshape(3, *STACK.mask.shape).astype(np.float32)
+
+
+def test_pixels_are_refitted_in_as_many_rounds_as_asked_for() -> None:
+    seen, bases = observations()
+    np.testing.assert_array_equal(refit_bases(seen, bases, rounds=0), bases)
+    found = []
+    for rounds in (1, 2, 3, 5):
+        told: list[float] = []
+        tell = lambda stage, done, told=told: told.append(done)  # noqa: E731
+        found.append(refit_bases(seen, bases, progress=tell, rounds=rounds))
+        assert told == [(n + 1) / rounds for n in range(rounds)]
+    assert all((one != other).any() for one, other in pairwise(found))
+
+
+def test_ties_are_settled_in_as_many_sweeps_as_asked_for() -> None:
+    """Two pixels a sweep: of an undecided band of eight columns, two each way."""
+    seen, bases = observations()
+    seen.images[3:, :, 60:68] = 0
+    lead = np.full(STACK.mask.shape, 9, np.int32)
+    lead[:, 60:68] = 0
+    start = bases.copy()
+    start[:, :, 60:68] = bases[[1, 0, 2], :, 60:68]
+    found = [
+        settle_ties(seen, start.copy(), lead.reshape(-1), sweeps=sweeps) for sweeps in range(5)
+    ]
+    np.testing.assert_array_equal(found[0], start)
+    changed = [np.flatnonzero((bases != start).any(axis=(0, 1))).tolist() for bases in found]
+    assert changed[1] == [60, 61, 66, 67]
+    assert changed[2] == list(range(60, 68))
+
+
+def test_what_makes_it_quick_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[object, ...]] = []
+
+    def spy(*known: Any) -> tuple[Array, Array]:
+        asked.append((known[4].samples, *known[7:]))
+        return linearize_robustly(*known)
+
+    monkeypatch.setattr(module, "linearize_robustly", spy)
+    follow(OTHER)
+    follow(OTHER, replace(NEAR, options=replace(NEAR.options, samples=12)))
+    assert asked == [(SAMPLES, REFITS, SWEEPS), (12, REFITS, SWEEPS)]
 
 
 # Refusals

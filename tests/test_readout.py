@@ -151,10 +151,7 @@ def test_the_legend_of_nothing_is_all_zero():
 
 def test_the_status_says_whether_the_bases_belong_to_the_thresholds_shown():
     assert threshold_status(THRESHOLDS, None) == "Nothing is linearized yet."
-    assert (
-        threshold_status(THRESHOLDS, Thresholds(0.05, 0.02))
-        == "Labels and linearized bases: T 0.0500, Ts 0.0200."
-    )
+    assert threshold_status(THRESHOLDS, Thresholds(0.05, 0.02)) == "T 0.0500, Ts 0.0200: final."
     assert threshold_status(Thresholds(0.06, 0.02), THRESHOLDS) == (
         "Labels: T 0.0600, Ts 0.0200. Linearized bases: T 0.0500, Ts 0.0200; "
         "linearize again to match."
@@ -231,11 +228,9 @@ def test_a_preview_tells_thresholds_and_time_as_they_are():
 
 
 def test_the_time_of_a_final_result_is_told_with_its_own_thresholds_only():
-    text = "Labels and linearized bases: T 0.0500, Ts 0.0200."
-    assert threshold_status(THRESHOLDS, THRESHOLDS, 0.3519) == (
-        f"{text} Final, linearized in 352 ms."
-    )
-    assert threshold_status(THRESHOLDS, THRESHOLDS, None) == text
+    text = "T 0.0500, Ts 0.0200: final"
+    assert threshold_status(THRESHOLDS, THRESHOLDS, 0.3519) == f"{text}, linearized in 352 ms."
+    assert threshold_status(THRESHOLDS, THRESHOLDS, None) == f"{text}."
     other = Thresholds(0.06, 0.02)
     assert threshold_status(other, THRESHOLDS, 0.35) == threshold_status(other, THRESHOLDS)
     assert threshold_status(THRESHOLDS, None, 0.35) == "Nothing is linearized yet."

@@ -10,8 +10,6 @@ from photolin.analysis import Options
 from photolin.errors import DegenerateError
 from photolin.factors import Thresholds
 from photolin.refine import MIN_T
-from photolin.sample import draw_sample
-from photolin.saturation import find_white
 from photolin.stack import ImageStack
 from photolin.synthetic import SCENES, render_scene
 from photolin.synthetic.render import Bits
@@ -19,8 +17,7 @@ from photolin.thresholds import Suggestion, suggest_thresholds
 
 
 def suggest(stack: ImageStack, options: Options | None = None) -> Suggestion:
-    sample = draw_sample(stack, 0, find_white(stack))
-    return suggest_thresholds(sample, options or Options(), stack.lights)
+    return suggest_thresholds(stack, options)
 
 
 @pytest.mark.parametrize("name", SCENES)

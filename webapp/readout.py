@@ -137,8 +137,8 @@ def threshold_status(
     T, T_used = _apart(shown.T, used.T)
     Ts, Ts_used = _apart(shown.Ts, used.Ts)
     if shown == used:
-        took = "" if seconds is None else f" Final, linearized in {1000 * seconds:.0f} ms."
-        return f"Labels and linearized bases: T {T}, Ts {Ts}.{took}"
+        took = "" if seconds is None else f", linearized in {1000 * seconds:.0f} ms"
+        return f"T {T}, Ts {Ts}: final{took}."
     return (
         f"Labels: T {T}, Ts {Ts}. Linearized bases: T {T_used}, Ts {Ts_used}; "
         "linearize again to match."

@@ -10,8 +10,6 @@ from photolin.compiling import tell_compiling
 from photolin.errors import Cancelled
 from photolin.factors import Thresholds
 from photolin.pipeline import analyze
-from photolin.sample import draw_sample
-from photolin.saturation import find_white
 from photolin.stack import ImageStack
 from photolin.thresholds import suggest_thresholds
 
@@ -59,8 +57,7 @@ class Runs:
         free = replace(self.options, T=None, Ts=None)
         with tell_compiling(progress) as told:
             told("finding thresholds", 0.5)
-            sample = draw_sample(self.stack, free.seed, find_white(self.stack))
-            return suggest_thresholds(sample, free, self.stack.lights, cancel).thresholds
+            return suggest_thresholds(self.stack, free, cancel).thresholds
 
     @contextmanager
     def _turn(self, progress: Progress, cancel: Cancel) -> Iterator[None]:
