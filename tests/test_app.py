@@ -93,7 +93,7 @@ def picture(image: int, gain: float = 1.0) -> np.ndarray:
 
 
 def enter(page: Any, app: App, *, live: bool = False) -> Session:
-    """Open a tab; its session, once it has drawn something. Without `live`, only labels follow T."""
+    """Open a tab; its session, once it has drawn. Without `live`, only labels follow T."""
     page.set_viewport_size({"width": 880, "height": 560})  # software GL is slow
     before = set(app._sessions)
     open_canvas(page, app.server.url)
