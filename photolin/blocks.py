@@ -4,9 +4,26 @@ import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed, wait
+from typing import NamedTuple
 
 from .analysis import Cancel, Progress
 from .errors import Cancelled
+
+
+class Talk(NamedTuple):
+    """How work is done and watched; nothing of it changes the result."""
+
+    threads: int | None = None
+    progress: Progress | None = None
+    cancel: Cancel | None = None
+
+    def part(self, start: float, stop: float) -> "Talk":
+        """The same for a part of the stage that goes from `start` to `stop` of it."""
+        tell = self.progress
+        if tell is None:
+            return self
+        length = stop - start
+        return self._replace(progress=lambda stage, f: tell(stage, start + f * length))
 
 
 def run_blocks(

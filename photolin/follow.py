@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel
+from .blocks import Talk
 from .errors import OptionError
 from .factors import Thresholds
 from .label import label_images
 from .refine import refine_coefficients
-from .robust import Quality, Talk, linearize_robustly
+from .robust import Quality, linearize_robustly
 from .sample import Sample, draw_sample
 from .saturation import find_white
 from .stack import ImageStack

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .analysis import Cancel, Options, Progress
-from .blocks import run_blocks
+from .blocks import Talk, run_blocks
 from .coefficients import KEEP, draw_samples
 from .errors import DegenerateError
 from .factors import Thresholds
 from .kernels import centre_rows, support_rows
-from .robust import Quality, Talk, linearize_robustly
+from .robust import Quality, linearize_robustly
 from .stack import ImageStack
 
 BLOCK = 4096

@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel, Options, Progress
+from .blocks import Talk
 from .coefficients import estimate_coefficients
 from .confidence import doubt_dimensions, doubt_distance, find_doubts, measure_confidence
 from .dimensions import fit_plane
@@ -26,14 +26,6 @@ from .thresholds import Suggestion, suggest_from_sample
 
 DOUBTED_PIXELS = 2000
 """Sampled pixels that tell whether the stack is one of three dimensions and distant lights."""
-
-
-class Talk(NamedTuple):
-    """How a run is worked on and watched; nothing of it changes the result."""
-
-    threads: int | None
-    progress: Progress | None
-    cancel: Cancel | None
 
 
 def analyze(

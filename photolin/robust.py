@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .analysis import Cancel, Options, Progress
-from .blocks import run_blocks
+from .analysis import Options
+from .blocks import Talk, run_blocks
 from .consensus import stopping_table
 from .factors import Thresholds
 from .fine import choose_step, fit_fine, thin_out
@@ -35,23 +35,6 @@ class Quality:
     """(K,) value from which observations of an image are saturated; infinity for none."""
     noise: float
     """Standard deviation of an observation, fraction of full scale."""
-
-
-@dataclass(frozen=True)
-class Talk:
-    """How work is done and watched; nothing of it changes the result."""
-
-    threads: int | None = None
-    progress: Progress | None = None
-    cancel: Cancel | None = None
-
-    def part(self, start: float, stop: float) -> "Talk":
-        """The same for a part of the stage that goes from `start` to `stop` of it."""
-        tell = self.progress
-        if tell is None:
-            return self
-        length = stop - start
-        return Talk(self.threads, lambda s, f: tell(s, start + f * length), self.cancel)
 
 
 def linearize_robustly(

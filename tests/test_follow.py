@@ -61,19 +61,14 @@ def part_of(rows: slice, columns: slice) -> tuple[Array, Array]:
 # What it finds
 
 
-@pytest.mark.parametrize("T", [0.016, 0.03, 0.1, 0.3])
-def test_labels_are_nearly_all_those_of_a_run_when_T_moves(T: float) -> None:
-    run = analyze(STACK, Options(T=T, Ts=0.02))
-    found = follow(Thresholds(T, 0.02))
-    agree = (found.labels == run.labels).mean()
+@pytest.mark.parametrize(
+    ("T", "Ts"), [(0.016, 0.02), (0.03, 0.02), (0.3, 0.02), (0.05, 0.0), (0.05, 0.1)]
+)
+def test_labels_are_nearly_all_those_of_a_run(T: float, Ts: float) -> None:
+    run = analyze(STACK, Options(T=T, Ts=Ts))
+    agree = (follow(Thresholds(T, Ts)).labels == run.labels).mean()
     assert agree > 0.995
     assert agree > (NEAR.labels == run.labels).mean() + 0.005
-
-
-@pytest.mark.parametrize("Ts", [0.0, 0.005, 0.1])
-def test_labels_are_nearly_all_those_of_a_run_when_the_shadow_level_moves(Ts: float) -> None:
-    run = analyze(STACK, Options(T=0.05, Ts=Ts))
-    assert (follow(Thresholds(0.05, Ts)).labels == run.labels).mean() > 0.995
 
 
 def test_steps_of_a_slider_add_up_to_no_drift() -> None:
@@ -177,10 +172,8 @@ def test_a_part_is_nearly_what_the_whole_is_there(step: int) -> None:
 
 @pytest.mark.parametrize("part", [np.s_[:1, :1], np.s_[40:41, :], np.s_[:, 60:61]])
 def test_a_part_of_one_line_or_pixel_is_followed(part: tuple[slice, slice]) -> None:
-    images, mask = part_of(*part)
-    found = follow_thresholds(images, mask, GROUND, NEAR, OTHER)
-    whole = follow(OTHER).labels[:, *part]
-    assert (found.labels == whole).mean() > 0.9
+    found = follow_thresholds(*part_of(*part), GROUND, NEAR, OTHER)
+    assert (found.labels == follow(OTHER).labels[:, *part]).mean() > 0.9
 
 
 @pytest.mark.parametrize("inside", [0, 1, 500])
@@ -199,7 +192,7 @@ def test_a_part_with_little_or_nothing_in_the_mask_is_followed(inside: int) -> N
 # Fewer rounds and sweeps
 
 
-@pytest.mark.parametrize("rounds", [1, 2, 3])
+@pytest.mark.parametrize("rounds", [1, 2])
 def test_coefficients_nearly_right_take_as_few_rounds_as_asked_for(rounds: int) -> None:
     """The last round is on the whole sample, at the width of the noise."""
     asked: list[int] = []
@@ -233,20 +226,17 @@ def test_pixels_are_refitted_in_as_many_rounds_as_asked_for() -> None:
 
 
 def test_ties_are_settled_in_as_many_sweeps_as_asked_for() -> None:
-    """Two pixels a sweep: of an undecided band of eight columns, two each way."""
+    """Two pixels a sweep: of an undecided band of eight columns, two from each side."""
     seen, bases = observations()
     seen.images[3:, :, 60:68] = 0
-    lead = np.full(STACK.mask.shape, 9, np.int32)
-    lead[:, 60:68] = 0
-    start = bases.copy()
-    start[:, :, 60:68] = bases[[1, 0, 2], :, 60:68]
-    found = [
-        settle_ties(seen, start.copy(), lead.reshape(-1), sweeps=sweeps) for sweeps in range(5)
-    ]
-    np.testing.assert_array_equal(found[0], start)
-    changed = [np.flatnonzero((bases != start).any(axis=(0, 1))).tolist() for bases in found]
-    assert changed[1] == [60, 61, 66, 67]
-    assert changed[2] == list(range(60, 68))
+    undecided = np.zeros(STACK.mask.shape, bool)
+    undecided[:, 60:68] = True
+    start = np.where(undecided, bases[[1, 0, 2]], bases)
+    among = np.flatnonzero(undecided)
+    known = (among.astype(np.int32) * 0, None, None, among)
+    found = [settle_ties(seen, start.copy(), *known, sweeps) for sweeps in range(3)]
+    changed = [np.flatnonzero((one != start).any(axis=(0, 1))).tolist() for one in found]
+    assert changed == [[], [60, 61, 66, 67], [*range(60, 68)]]
 
 
 def test_what_makes_it_quick_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,8 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .consensus import MIN_WEIGHT, _solve
-from .pooled import SINGULAR, _add
+from .pooled import _solve_sums, _sum_up
 
 # Inner loops run over whole rows with indices from 0: only those become vector instructions.
 
@@ -52,19 +51,7 @@ def _solve_row(total, b0, b1, b2, doubt):  # pragma: no cover
     w = np.empty(3, np.float64)
     for j in range(len(b0)):
         g = total[:, j]
-        good = g[9] >= MIN_WEIGHT and _solve(
-            np.float64(g[0]),
-            np.float64(g[1]),
-            np.float64(g[2]),
-            np.float64(g[3]),
-            np.float64(g[4]),
-            np.float64(g[5]),
-            np.float64(g[6]),
-            np.float64(g[7]),
-            np.float64(g[8]),
-            SINGULAR,
-            w,
-        )
+        good = _solve_sums(g, w)
         doubt[j] = not good
         if not good:
             w[:] = 0
@@ -100,14 +87,7 @@ def fine_band(
         c = A[:, k].copy()
         for i in range(rows):
             _take(images[k, top + i, span], white[k], Ts, spread[k, :columns], u, y)
-            n = 0
-            for a in range(3):
-                for b in range(a, 3):
-                    _add(total[i, n], u, c[a] * c[b])
-                    n += 1
-            for a in range(3):
-                _add(total[i, 6 + a], y, c[a])
-            _add(total[i, 9], u, np.float32(1))
+            _sum_up(total[i], u, y, c)
     against = np.zeros(columns, np.int32)
     for i in range(rows):
         z = top + i

@@ -66,6 +66,37 @@ def _add(total, u, a):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
+def _sum_up(total, u, y, c):  # pragma: no cover
+    """Add one image to the normal equations (10, n) of a row: G, h and the sum of weights."""
+    n = 0
+    for a in range(3):
+        for b in range(a, 3):
+            _add(total[n], u, c[a] * c[b])
+            n += 1
+    for a in range(3):
+        _add(total[6 + a], y, c[a])
+    _add(total[9], u, np.float32(1))
+
+
+@njit(nogil=True, cache=True)
+def _solve_sums(g, w):  # pragma: no cover
+    """Solution w (3,) of the sums g (10,) of `_sum_up`; false where they do not determine one."""
+    return g[9] >= MIN_WEIGHT and _solve(
+        np.float64(g[0]),
+        np.float64(g[1]),
+        np.float64(g[2]),
+        np.float64(g[3]),
+        np.float64(g[4]),
+        np.float64(g[5]),
+        np.float64(g[6]),
+        np.float64(g[7]),
+        np.float64(g[8]),
+        SINGULAR,
+        w,
+    )
+
+
+@njit(nogil=True, cache=True)
 def _look_around(
     images, usable, A, white, Ts, bases, cap, top, left, k, near, lit, across, among
 ):  # pragma: no cover
@@ -141,14 +172,7 @@ def pooled_tile(
             x = images[k, top + i, left : left + columns]
             for j in range(columns):
                 y[j] = u[j] * x[j]
-            n = 0
-            for a in range(3):
-                for b in range(a, 3):
-                    _add(total[i, n], u, c[a] * c[b])
-                    n += 1
-            for a in range(3):
-                _add(total[i, 6 + a], y, c[a])
-            _add(total[i, 9], u, np.float32(1))
+            _sum_up(total[i], u, y, c)
     return _solve_tile(total, usable, bases, top, left, out)
 
 
@@ -169,21 +193,7 @@ def _solve_tile(total, usable, bases, top, left, out):  # pragma: no cover
             for c in range(3):
                 out[c, y, z] = bases[c, y, z]
             g = total[i, :, j]
-            if not usable[y, z] or g[9] < MIN_WEIGHT:
-                continue
-            if _solve(
-                np.float64(g[0]),
-                np.float64(g[1]),
-                np.float64(g[2]),
-                np.float64(g[3]),
-                np.float64(g[4]),
-                np.float64(g[5]),
-                np.float64(g[6]),
-                np.float64(g[7]),
-                np.float64(g[8]),
-                SINGULAR,
-                w,
-            ):
+            if usable[y, z] and _solve_sums(g, w):
                 moved = size = 0.0
                 for c in range(3):
                     moved += (w[c] - out[c, y, z]) ** 2
