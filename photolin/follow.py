@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel
 from .blocks import Talk
-from .errors import OptionError
+from .errors import DegenerateError, OptionError
 from .factors import Thresholds
 from .label import label_images
 from .refine import refine_coefficients
@@ -26,6 +26,8 @@ SAMPLES = 30
 """Most random samples of a pixel: a T far too small would ask for hundreds."""
 SWEEPS = 1
 """Sweeps of settling ties."""
+WORST_CONDITION = 1e6
+"""Of the lights of the base images."""
 REFITS = 3
 """Rounds of refitting the pixels."""
 
@@ -122,6 +124,11 @@ def follow_thresholds(
 def relate(coefficients: NDArray[np.float64], near: Analysis) -> NDArray[np.float64]:
     """Coefficients with unit vectors in the rows of the base images of `near`."""
     bases = list(near.base_images)
+    if not np.linalg.cond(coefficients[bases]) < WORST_CONDITION:
+        raise DegenerateError(
+            f"with these thresholds the lights of base images {near.base_images} lie in one plane; "
+            "choose others"
+        )
     related = coefficients @ np.linalg.inv(coefficients[bases])
     related[bases] = np.eye(3)
     return related

@@ -31,11 +31,14 @@ class FakeRuns:
     cancelled: list[Options] = field(default_factory=list)
     release: threading.Event = field(default_factory=threading.Event)
     fault: Exception | None = None
+    looks: int = 0
+    """How often a run has asked whether to stop."""
 
     def run(self, options: Options, progress: Progress, cancel: Cancel) -> Analysis:
         progress("linearize", 0.5)
         self.began.append(options)
         while not self.release.wait(0.005):
+            self.looks += 1
             if cancel():
                 self.cancelled.append(options)
                 raise Cancelled("the run was cancelled")
@@ -143,6 +146,8 @@ def test_a_run_goes_on_while_its_thresholds_are_still_wanted(watched: Watched) -
     for state in (MOVED, replace(MOVED, image=3), replace(MOVED, layer="residual")):
         for rested in (False, True):
             watched.pursue(state, rested=rested)
+    looks = watched.runs.looks
+    wait_until(lambda: watched.runs.looks > looks + 1 or watched.ends != [])
     watched.runs.release.set()
     watched.wait_for_runs(1, 1)
     assert watched.runs.cancelled == []

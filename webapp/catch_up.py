@@ -52,8 +52,10 @@ class CatchUp:
             return False
         if self._running not in (None, wanted):
             self._job.stop()
-        if rested:
-            self._job.start(partial(self._run, state.method, wanted))
+        if rested and self._running is None:
+            self._running = wanted
+            if not self._job.start(partial(self._run, state.method, wanted)):
+                self._running = None
         return not rested
 
     def close(self) -> None:
@@ -61,7 +63,6 @@ class CatchUp:
         self._job.close()
 
     def _run(self, method: Method, thresholds: Thresholds) -> None:
-        self._running = thresholds
         options = replace(self._runs.options, method=method, T=thresholds.T, Ts=thresholds.Ts)
         try:
             result = self._runs.run(options, lambda stage, fraction: None, self._job.stopping)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from photolin.analysis import Analysis, Cancel
 from photolin.errors import DegenerateError
+from photolin.factors import Thresholds
 from photolin.follow import Ground, follow_thresholds, prepare_ground
 from photolin.stack import ImageStack
 
@@ -83,6 +84,8 @@ class Live:
         self._part: Part | None = None
         self._cut = (stack.images, stack.mask)
         self._preview: Preview | None = None
+        self._refused: tuple[Analysis, Part, Thresholds] | None = None
+        """What gave no result the last time."""
 
     def follow(
         self, state: ViewState, near: Analysis, window: Window | None, cancel: Cancel
@@ -106,6 +109,8 @@ class Live:
         now = (near, part, state.thresholds)
         if last is not None and (last.near, last.part, last.analysis.thresholds) == now:
             return last
+        if now == self._refused:
+            return None
         if self._ground is None:
             self._ground = prepare_ground(self._stack, near.options.seed)
         if part != self._part:
@@ -115,6 +120,7 @@ class Live:
                 *self._cut, self._ground, near, state.thresholds, cancel=cancel
             )
         except DegenerateError:
+            self._refused = now
             return None
         self._preview = Preview(found, part, near)
         return self._preview
@@ -133,10 +139,13 @@ def choose_part(shape: tuple[int, int], window: Window | None) -> Part:
     row0, row1, column0, column1, scale = window
     # one pixel for each of the screen, and no more than can be followed
     step = max(1, int(1 / scale) if scale < 1 else 1)
-    while -(-(row1 - row0) // step) * -(-(column1 - column0) // step) > MOST_PIXELS:
+    while True:
+        # on one grid for all windows: a moved one keeps the pixels it looks at
+        part = Part(row0 // step * step, row1, column0 // step * step, column1, step)
+        rows, columns = (range(*s.indices(max(shape))) for s in part.place)
+        if len(rows) * len(columns) <= MOST_PIXELS:
+            return part
         step += 1
-    # a moved window keeps the pixels it looks at
-    return Part(row0 // step * step, row1, column0 // step * step, column1, step)
 
 
 def cut(stack: ImageStack, part: Part) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
