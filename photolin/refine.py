@@ -46,8 +46,8 @@ STILL = 2e-5
 DAMPING = 1e-6
 NOISE_OBSERVATIONS = 120_000
 """Observations from which noise is read, at least."""
-HESSIAN_PIXELS = 800
-"""Pixels that say how the coefficients depend on each other, at least."""
+HESSIAN_OBSERVATIONS, HESSIAN_PIXELS = 20_000, 300
+"""Observations that say how the coefficients depend on each other, and pixels, at least."""
 
 
 def refine_coefficients(
@@ -194,7 +194,7 @@ def gauss_newton_step(
     gradient = (w * (x - b @ c.T)).T @ b
     # b follows c: what a change of c moves within the span of c does not count
     # the Hessian only says which way to step: float32 and some of the pixels are enough
-    step = max(1, len(b) // HESSIAN_PIXELS)
+    step = max(1, len(b) // max(HESSIAN_OBSERVATIONS // K, HESSIAN_PIXELS))
     b, w, inverse = b[::step], w[::step] * step, inverse[::step] / step
     spanned = np.linalg.cholesky(inverse).transpose(0, 2, 1) @ c.T * w[:, None, :]
     spanned = spanned.astype(np.float32).reshape(-1, K)
