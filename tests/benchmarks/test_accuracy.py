@@ -17,11 +17,11 @@ from photolin import (
     LoadOptions,
     analyze,
     factorize,
-    linearize,
     load_stack,
     load_truth,
     refine,
     render_scene,
+    robust,
     thresholds,
 )
 from photolin.analysis import Options
@@ -172,20 +172,19 @@ INGREDIENTS: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
     "no balance of directions": lambda patch: patch.setattr(
         factorize, "balance_directions", lambda bases, rng: bases
     ),
-    "one round of refinement": lambda patch: (
-        patch.setattr(refine, "ROUNDS", 1),
-        patch.setattr(refine, "EARLY", 0),
-    )[0],
+    "one round of refinement": lambda patch: patch.setattr(
+        thresholds, "refine_coefficients", partial(thresholds.refine_coefficients, rounds=1)
+    ),
     "no annealing": lambda patch: patch.setattr(refine, "FIRST_WIDTH", refine.LAST_WIDTH),
     "no settling by neighbours": lambda patch: patch.setattr(
-        linearize, "settle_ties", lambda seen, bases, *rest: bases
+        robust, "settle_ties", lambda seen, bases, *rest, **more: bases
     ),
     "no refit without shared highlights": lambda patch: patch.setattr(
-        linearize, "refit_bases", lambda seen, bases, *rest: bases
+        robust, "refit_bases", lambda seen, bases, *rest: bases
     ),
     "no weighted first fit": lambda patch: (
-        patch.setattr(linearize, "REACH", 0.0),
-        patch.setattr(linearize, "LEAST_REACH", 0.0),
+        patch.setattr(robust, "REACH", 0.0),
+        patch.setattr(robust, "LEAST_REACH", 0.0),
     )[0],
 }
 
