@@ -118,9 +118,9 @@ def preview_status(thresholds: Thresholds, step: int, whole: bool, seconds: floa
     """That a linearization has followed the thresholds, how much of it, and how long it took."""
     T, Ts = _threshold(thresholds.T), _threshold(thresholds.Ts)
     nth = {1: "st", 2: "nd", 3: "rd"}.get(step % 10 if step % 100 not in (11, 12, 13) else 0, "th")
-    each = "every pixel" if step == 1 else f"every {step}{nth} pixel"
-    part = "" if whole else f" of {each} on screen"
-    return f"T {T}, Ts {Ts}: preview{part}, linearized in {1000 * seconds:.0f} ms."
+    each = "the part on screen" if step == 1 else f"every {step}{nth} pixel"
+    part = "" if whole else f" of {each}"
+    return f"T {T}, Ts {Ts}: preview{part} in {1000 * seconds:.0f} ms, final to come."
 
 
 def threshold_status(

@@ -6,7 +6,13 @@ TEXT = """
 Every pixel of every image is labelled **D** diffuse, **S** specular, **A** attached shadow
 (the surface faces away from the light), **C** cast shadow (something blocks the light) or **U**
 undefined. Move **T** and **Ts** until the labels look right, click pixels to see why they are what
-they are, then linearize again and export.
+they are, then export.
+
+While **live** is on, everything is linearized again as a slider moves: a *preview* of what is on
+screen at once, the *final* result of the whole stack when the slider rests. With **live** off the
+labels alone follow until you linearize again. The view *input* is the photograph, *linearized*
+what it would be with diffuse reflection alone (mid-grey is zero), *residual* the difference.
+Sentences in yellow under *About this result* say what is doubtful.
 
 | key | does |
 |---|---|
