@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .analysis import Cancel
 from .blocks import run_blocks
 from .kernels import settle_rows, trust_rows
+from .kernels.neighbours import TURN
 from .observations import Observations
 
 BLOCK = 1 << 14
@@ -16,6 +17,8 @@ SWEEPS = 4
 """Most steps of two pixels by which a solution spreads."""
 CERTAIN = 0.03
 """Uncertainty of a pixel's direction, radians, that halves what its neighbours make of it."""
+PAIRS, FEWEST_PAIRS = 4000, 50
+"""Neighbours that are compared to see whether the surface is smooth, about, and at least."""
 DOUBTFUL = 0.5
 """Trust below which a pixel listens to its neighbours."""
 
@@ -59,6 +62,8 @@ def settle_ties(
         trust_rows(X, pixels, *known, np.float32(CERTAIN), flat, lead, trust, start, stop)
 
     run_blocks(weigh, len(pixels), BLOCK, threads=threads, stage="linearize", cancel=cancel)
+    if is_rough(flat, trust, (H, W)):
+        return bases
     listening = doubtful = pixels[(trust[pixels] < DOUBTFUL) & (trust[pixels] > 0)]
     for _ in range(sweeps):
         out = np.empty((len(doubtful), 3), np.float32)
@@ -73,6 +78,24 @@ def settle_ties(
         trust[moved] = np.maximum(trust[moved], gained[changed])
         doubtful = listening[reached_by(moved, listening, (H, W))]
     return bases
+
+
+def is_rough(flat: NDArray[np.float32], trust: NDArray[np.float32], shape: tuple[int, int]) -> bool:
+    """Whether neighbours that are sure of themselves differ so much that none tells of another.
+
+    Args:
+        flat: (3,N) bases.
+        trust: (N,)
+    """
+    sure = (trust > DOUBTFUL).reshape(shape)
+    left = np.flatnonzero((sure[:, :-1] & sure[:, 1:]).ravel())
+    left = left[:: max(1, len(left) // PAIRS)]
+    if len(left) < FEWEST_PAIRS:
+        return False
+    at = left + left // max(shape[1] - 1, 1)
+    here, there = flat[:, at], flat[:, at + 1]
+    here, there = (v / (np.linalg.norm(v, axis=0) + 1e-12) for v in (here, there))
+    return bool(np.median(np.linalg.norm(here - there, axis=0)) > TURN)
 
 
 def reached_by(

@@ -10,7 +10,7 @@ from photolin import settle as module
 from photolin.errors import Cancelled
 from photolin.factorize import orthogonalize
 from photolin.observations import Observations
-from photolin.settle import settle_ties
+from photolin.settle import is_rough, settle_ties
 
 H, W, K = 12, 16, 24
 Array = np.ndarray
@@ -269,3 +269,14 @@ def test_it_can_be_cancelled_in_every_sweep(asked: int) -> None:
     answers = iter([False] * asked + [True] * 99)
     with pytest.raises(Cancelled, match="linearize was cancelled"):
         settle_ties(seen, start, lead.ravel(), cancel=lambda: next(answers))
+
+
+@pytest.mark.parametrize(("roughness", "rough"), [(0.0, False), (0.1, False), (0.6, True)])
+def test_pixels_that_have_nothing_in_common_do_not_ask_each_other(
+    roughness: float, rough: bool
+) -> None:
+    rng = np.random.default_rng(0)
+    flat = rng.normal((0, 0, 1), roughness, (900, 3)).T.astype(np.float32)
+    trust = np.ones(900, np.float32)
+    assert is_rough(flat, trust, (30, 30)) == rough
+    assert not is_rough(flat, trust * (np.arange(900) < 40), (30, 30))  # too few to tell
