@@ -253,3 +253,8 @@ def test_a_preview_can_be_cancelled_and_asked_for_again() -> None:
     found = live.follow(MOVED, NEAR, None, never)
     assert found is not None
     assert found.analysis.thresholds == MOVED.thresholds
+
+
+def test_a_window_of_hardly_any_scale_asks_for_no_more_than_the_picture_has() -> None:
+    part = choose_part((800, 700), Window(5, 800, 3, 700, 1e-7))
+    assert part == Part(0, 800, 0, 700, 800)

@@ -138,7 +138,7 @@ def choose_part(shape: tuple[int, int], window: Window | None) -> Part:
         window = Window(0, H, 0, W, 1.0)
     row0, row1, column0, column1, scale = window
     # one pixel for each of the screen, and no more than can be followed
-    step = max(1, int(1 / scale) if scale < 1 else 1)
+    step = min(max(1, int(1 / scale) if scale < 1 else 1), max(H, W))
     while True:
         # on one grid for all windows: a moved one keeps the pixels it looks at
         part = Part(row0 // step * step, row1, column0 // step * step, column1, step)
