@@ -99,3 +99,21 @@ def invert_regular(
     # factors of 1e-38 and less have an inverse beyond single precision
     usable = np.abs(inverses).max(axis=(1, 2), initial=0) < np.finfo(np.float32).max
     return triples[regular][usable], inverses[usable].astype(np.float32)
+
+
+def relate_to_bases(
+    coefficients: NDArray[np.float64], base_images: tuple[int, int, int]
+) -> NDArray[np.float64]:
+    """The same coefficients with unit vectors in the rows of the base images.
+
+    Raises:
+        DegenerateError: the lights of the base images lie in one plane.
+    """
+    rows = coefficients[list(base_images)]
+    if not np.linalg.cond(rows) < 1e6:
+        raise DegenerateError(
+            f"the lights of base images {base_images} lie in one plane; choose other base images"
+        )
+    related = coefficients @ np.linalg.inv(rows)
+    related[list(base_images)] = np.eye(3)
+    return related

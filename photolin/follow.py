@@ -9,7 +9,8 @@ from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel
 from .blocks import Talk
-from .errors import DegenerateError, OptionError
+from .coefficients import relate_to_bases
+from .errors import OptionError
 from .factors import Thresholds
 from .label import label_images
 from .refine import refine_coefficients
@@ -26,8 +27,6 @@ SAMPLES = 30
 """Most random samples of a pixel: a T far too small would ask for hundreds."""
 SWEEPS = 1
 """Sweeps of settling ties."""
-WORST_CONDITION = 1e6
-"""Of the lights of the base images."""
 REFITS = 3
 """Rounds of refitting the pixels."""
 
@@ -97,7 +96,11 @@ def follow_thresholds(
             cancel,
             ROUNDS,
         )
-        c = near.coefficients if ground.lights is not None else relate(found.coefficients, near)
+        c = (
+            near.coefficients
+            if ground.lights is not None
+            else relate_to_bases(found.coefficients, near.base_images)
+        )
         quality = Quality(ground.white, found.noise.absolute)
         talk = Talk(threads, None, cancel)
         bases, _ = linearize_robustly(
@@ -119,16 +122,3 @@ def follow_thresholds(
         lights=ground.lights,
         files=near.files,
     )
-
-
-def relate(coefficients: NDArray[np.float64], near: Analysis) -> NDArray[np.float64]:
-    """Coefficients with unit vectors in the rows of the base images of `near`."""
-    bases = list(near.base_images)
-    if not np.linalg.cond(coefficients[bases]) < WORST_CONDITION:
-        raise DegenerateError(
-            f"with these thresholds the lights of base images {near.base_images} lie in one plane; "
-            "choose others"
-        )
-    related = coefficients @ np.linalg.inv(coefficients[bases])
-    related[bases] = np.eye(3)
-    return related

@@ -10,10 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from .analysis import Analysis, Cancel, Options, Progress
 from .blocks import Talk
-from .coefficients import estimate_coefficients
+from .coefficients import estimate_coefficients, relate_to_bases
 from .confidence import doubt_dimensions, doubt_distance, find_doubts, measure_confidence
 from .dimensions import fit_plane
-from .errors import DegenerateError, OptionError
+from .errors import OptionError
 from .factorize import Factorization
 from .factors import Thresholds
 from .label import label_images
@@ -141,24 +141,6 @@ def check_base_images(options: Options, stack: ImageStack) -> None:
             f"base_images is {options.base_images}; {stack.title} has images 0 to "
             f"{len(stack.images) - 1}"
         )
-
-
-def relate_to_bases(
-    coefficients: NDArray[np.float64], base_images: tuple[int, int, int]
-) -> NDArray[np.float64]:
-    """The same coefficients with unit vectors in the rows of the base images.
-
-    Raises:
-        DegenerateError: the lights of the base images lie in one plane.
-    """
-    rows = coefficients[list(base_images)]
-    if not np.linalg.cond(rows) < 1e6:
-        raise DegenerateError(
-            f"the lights of base images {base_images} lie in one plane; choose other base images"
-        )
-    related = coefficients @ np.linalg.inv(rows)
-    related[list(base_images)] = np.eye(3)
-    return related
 
 
 def doubt_lights(

@@ -25,7 +25,7 @@ from .factorize import (
 from .sample import Sample
 
 WITHIN = 0.84
-"""Share of the noise that the suggested T lets pass (1.8 standard deviations of a normal one). It
+"""Share of the noise that the suggested T lets pass (1.4 standard deviations of a normal one). It
 trades diffuse pixels lost to noise against highlights lost to T, for the best mean of both."""
 MIN_T, MAX_T = 0.016, 0.12
 FIRST_T = 0.1

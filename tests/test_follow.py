@@ -9,6 +9,7 @@ import pytest
 
 from photolin import follow as module
 from photolin.analysis import Analysis, Options
+from photolin.coefficients import relate_to_bases
 from photolin.errors import Cancelled, DegenerateError, OptionError
 from photolin.factorize import orthogonalize
 from photolin.factors import OUTSIDE, Thresholds
@@ -20,7 +21,6 @@ from photolin.follow import (
     Ground,
     follow_thresholds,
     prepare_ground,
-    relate,
 )
 from photolin.label import label_images
 from photolin.observations import Observations
@@ -84,7 +84,7 @@ def test_steps_of_a_slider_add_up_to_no_drift() -> None:
 def test_coefficients_are_refined_and_not_only_kept() -> None:
     """They have to recover from a start that is a little off."""
     more = np.random.default_rng(0).normal(0, 0.01, NEAR.coefficients.shape)
-    off = relate(NEAR.coefficients + more, NEAR)
+    off = relate_to_bases(NEAR.coefficients + more, NEAR.base_images)
     found = follow(OTHER, replace(NEAR, coefficients=off))
     before, after = (np.abs(c - NEAR.coefficients).max() for c in (off, found.coefficients))
     assert before > 0.01
@@ -200,7 +200,9 @@ def test_coefficients_nearly_right_take_as_few_rounds_as_asked_for(rounds: int) 
     found = refine_coefficients(*known, lambda: bool(asked.append(1)), rounds)
     assert len(asked) == rounds
     assert found.bases.shape == (3, PIXELS)
-    np.testing.assert_allclose(relate(found.coefficients, NEAR), NEAR.coefficients, atol=2e-3)
+    np.testing.assert_allclose(
+        relate_to_bases(found.coefficients, NEAR.base_images), NEAR.coefficients, atol=2e-3
+    )
 
 
 def observations() -> tuple[Observations, Array]:
