@@ -7,7 +7,7 @@ import pytest
 
 from photolin.errors import OptionError
 from photolin.load import LoadOptions, load_stack
-from photolin.thresholds import sample_shadow_level
+from photolin.shadow_level import sample_shadow_level
 
 
 def test_separate_samples_are_parted_without_error() -> None:

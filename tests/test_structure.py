@@ -19,7 +19,7 @@ FLOORS = (
     ("kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine", "saturation"),
-    ("robust", "label", "thresholds"),
+    ("robust", "label", "shadow_level", "thresholds"),
     ("linearize", "follow"),
     ("near_light", "dimensions", "confidence"),
     ("shape", "oracle", "evaluate", "paper"),

@@ -8,12 +8,13 @@ from lambert import lambertian, wrap
 
 from photolin.analysis import Options
 from photolin.errors import DegenerateError
+from photolin.factorize import NO_NOISE, Factorization
 from photolin.factors import Thresholds
 from photolin.refine import MIN_T
 from photolin.stack import ImageStack
 from photolin.synthetic import SCENES, render_scene
 from photolin.synthetic.render import Bits
-from photolin.thresholds import Suggestion, suggest_thresholds
+from photolin.thresholds import Suggestion, clipped_noise, suggest_thresholds
 
 
 def suggest(stack: ImageStack, options: Options | None = None) -> Suggestion:
@@ -33,6 +34,32 @@ def test_8_bit_scenes_with_noise_get_a_shadow_level_above_it(name: str) -> None:
     t = suggest(render_scene(name, noise=0.01, bits=8).stack).thresholds
     assert 0.035 <= t.T <= 0.055
     assert 0.018 <= t.Ts <= 0.045
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_broad_noise_that_is_clipped_at_black_is_not_taken_for_black_shadows(name: str) -> None:
+    """3 % of noise has no mode in the histogram of all grays."""
+    t = suggest(render_scene(name, size=(120, 160), noise=0.03, bits=None, seed=5).stack).thresholds
+    assert 0.065 <= t.Ts <= 0.085
+
+
+def test_faint_light_in_attached_shadows_is_not_taken_for_noise() -> None:
+    """Interreflection there says nothing of the shadow level elsewhere."""
+    found = Factorization(np.eye(3), -np.ones((3, 500), np.float32), 0, NO_NOISE)
+    rng = np.random.default_rng(0)
+    light = np.abs(rng.normal(0.02, 0.005, (3, 500))).astype(np.float32)
+    assert clipped_noise(light, found) == 0
+    noise = rng.normal(0, 0.02, (3, 500)).clip(0).astype(np.float32)
+    np.testing.assert_allclose(clipped_noise(noise, found), 0.02, rtol=0.1)
+    np.testing.assert_allclose(clipped_noise(3 * noise, found), 3 * clipped_noise(noise, found))
+
+
+def test_few_attached_shadows_say_nothing_of_the_noise() -> None:
+    found = Factorization(np.eye(3), -np.ones((3, 10), np.float32), 0, NO_NOISE)
+    few = np.tile(np.array([0, 0, 0, 0.02, 0.03], np.float32), (3, 2))
+    assert clipped_noise(few, found) == 0
+    many = Factorization(np.eye(3), -np.ones((3, 100), np.float32), 0, NO_NOISE)
+    assert clipped_noise(np.tile(few, 10), many) > 0
 
 
 def test_more_noise_gives_a_larger_tolerance() -> None:
