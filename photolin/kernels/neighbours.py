@@ -9,6 +9,10 @@ from .consensus import SINGULAR, _solve
 MOST = 24
 """Neighbours of a pixel: a window of 5 x 5 without its centre."""
 STEPS = 4
+TRIES = 6
+"""Neighbours whose solution is tried, at most: the surest, and none like one before."""
+ALIKE = np.float32(0.1)
+"""Difference of directions, radians, below which both end in the same solution."""
 TURN = np.float32(0.3)
 """How much the direction of a solution differs between neighbours, radians; wide, because all it
 has to tell apart are solutions that have nothing to do with each other."""
@@ -137,6 +141,19 @@ def _meet(p, width, bases, trust, units, say):  # pragma: no cover
 
 
 @njit(nogil=True, cache=True)
+def _is_new(units, tried, many, q):  # pragma: no cover
+    """Whether no direction like that of neighbour q is among the `many` that were tried."""
+    for t in range(many):
+        p = tried[t]
+        d = np.float32(0)
+        for c in range(3):
+            d += (units[q, c] - units[p, c]) ** 2
+        if d < ALIKE * ALIKE:
+            return False
+    return True
+
+
+@njit(nogil=True, cache=True)
 def _choose(
     x, a0, a1, a2, n, units, say, count, noise, strange, v, w, ratios, best
 ):  # pragma: no cover
@@ -146,7 +163,14 @@ def _choose(
     """
     cost = strange + _against(x, a0, a1, a2, n, best, noise)
     changed = False
+    tried, many = np.empty(TRIES, np.int64), 0
     for q in np.argsort(-say[:count]):
+        if not _is_new(units, tried, many, q):
+            continue
+        if many == TRIES:
+            break
+        tried[many] = q
+        many += 1
         size = _scale(x, a0, a1, a2, n, units[q], ratios)
         if size <= 0:
             continue
