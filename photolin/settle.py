@@ -87,15 +87,18 @@ def is_rough(flat: NDArray[np.float32], trust: NDArray[np.float32], shape: tuple
         flat: (3,N) bases.
         trust: (N,)
     """
-    sure = (trust > DOUBTFUL).reshape(shape)
-    left = np.flatnonzero((sure[:, :-1] & sure[:, 1:]).ravel())
-    left = left[:: max(1, len(left) // PAIRS)]
-    if len(left) < FEWEST_PAIRS:
-        return False
-    at = left + left // max(shape[1] - 1, 1)
-    here, there = flat[:, at], flat[:, at + 1]
-    here, there = (v / (np.linalg.norm(v, axis=0) + 1e-12) for v in (here, there))
-    return bool(np.median(np.linalg.norm(here - there, axis=0)) > TURN)
+    sure = np.pad((trust > DOUBTFUL).reshape(shape), ((0, 1), (0, 1)))
+    turns = []
+    for step in (1, shape[1]):
+        beside = sure[:-1, 1:] if step == 1 else sure[1:, :-1]
+        at = np.flatnonzero(sure[:-1, :-1] & beside)
+        at = at[:: max(1, len(at) // PAIRS)]
+        here, there = (
+            v / (np.linalg.norm(v, axis=0) + 1e-12) for v in (flat[:, at], flat[:, at + step])
+        )
+        turns.append(np.linalg.norm(here - there, axis=0))
+    turned = np.concatenate(turns)
+    return len(turned) >= FEWEST_PAIRS and bool(np.median(turned) > TURN)
 
 
 def reached_by(

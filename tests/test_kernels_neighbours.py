@@ -153,7 +153,15 @@ def settle(
     close = abs(strange - 0.5) < 1e-4
     if strange < 0.5:
         return best, gained, close
+    tried: list[Array] = []
     for q in np.argsort(-said):
+        turns = np.array([((units[q] - unit) ** 2).sum() for unit in tried])
+        close |= bool((abs(turns - 0.01) < 1e-6).any())
+        if (turns < 0.01).any():
+            continue
+        if len(tried) == 6:
+            break
+        tried.append(units[q])
         size = scale(x, a, units[q])
         if size <= 0:
             continue

@@ -280,3 +280,15 @@ def test_pixels_that_have_nothing_in_common_do_not_ask_each_other(
     trust = np.ones(900, np.float32)
     assert is_rough(flat, trust, (30, 30)) == rough
     assert not is_rough(flat, trust * (np.arange(900) < 40), (30, 30))  # too few to tell
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_a_surface_that_is_smooth_one_way_only_is_half_smooth(along: int) -> None:
+    """Grooves: along them neighbours agree, across them they do not; more than half then does."""
+    rng = np.random.default_rng(0)
+    grooves = np.broadcast_to(rng.normal((0, 0, 1), 0.2, (30, 1, 3)), (30, 30, 3))
+    flat = np.moveaxis(grooves, 2, 0).astype(np.float32)
+    flat = flat.swapaxes(1, 2) if along else flat
+    assert not is_rough(
+        np.ascontiguousarray(flat).reshape(3, -1), np.ones(900, np.float32), (30, 30)
+    )
