@@ -23,6 +23,8 @@ REACH = 4.0
 """Residual, in units of the noise, from which an observation has no weight in the last fit."""
 LEAST_REACH = 0.003
 """The least such residual, as a share of the brightest grays."""
+CROPPED = 0.5
+"""Share of the picture that the object's rectangle has at most to be worked on by itself."""
 LEAST_NOISE = 6e-4
 """The least noise, as a share of the brightest grays: rounding and faint light from elsewhere."""
 
@@ -55,6 +57,51 @@ def linearize_robustly(
         mask: (H,W)
         rounds, sweeps: fewer make it quicker, and less exact.
     """
+    rules = Rules(thresholds.T, thresholds.Ts, options.samples, options.seed, rounds, sweeps)
+    box = bound(mask)
+    if mask[box].size > CROPPED * mask.size:
+        return fit_picture(images, mask, coefficients, quality, rules, talk)
+    inside = np.ascontiguousarray(images[:, *box]), np.ascontiguousarray(mask[box])
+    bases = np.zeros((3, *mask.shape), np.float32)
+    bases[:, *box], lead = fit_picture(*inside, coefficients, quality, rules, talk)
+    return bases, lead
+
+
+def bound(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """Rows and columns of the smallest rectangle that holds all of a mask."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        return slice(0), slice(0)
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What decides a consensus."""
+
+    T: float
+    """Relative tolerance."""
+    Ts: float
+    """Shadow level, fraction of full scale."""
+    limit: int
+    """The most samples."""
+    seed: int
+    """Of all samples."""
+    rounds: int = ROUNDS
+    """Rounds of `refit_bases`."""
+    sweeps: int = SWEEPS
+    """Sweeps of `settle_ties`."""
+
+
+def fit_picture(
+    images: NDArray[np.float32],
+    mask: NDArray[np.bool_],
+    coefficients: NDArray[np.float64],
+    quality: Quality,
+    rules: Rules,
+    talk: Talk,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The same for a picture that the object nearly fills."""
     # solved in an orthogonal frame (see `factorize.orthogonalize`), returned in that of the bases
     q, r = np.linalg.qr(coefficients)
     scale = np.sqrt(len(q) / 3)
@@ -63,9 +110,7 @@ def linearize_robustly(
     some = images.reshape(len(images), -1)[:, pixels[:: max(1, len(pixels) // 1000)]]
     bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
-    reach = max(REACH * quality.noise, LEAST_REACH * bright)
-    seen = Observations(images, mask, factors, quality.white, thresholds.Ts, noise, bright)
-    rules = Rules(thresholds.T, reach, options.samples, options.seed, rounds, sweeps)
+    seen = Observations(images, mask, factors, quality.white, rules.Ts, noise, bright)
     step = choose_step(len(pixels), len(images))
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
@@ -75,24 +120,6 @@ def linearize_robustly(
     for start in range(0, flat.shape[1], TURNED):
         flat[:, start : start + TURNED] = back @ flat[:, start : start + TURNED]
     return bases, lead
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What decides a consensus."""
-
-    T: float
-    """Relative tolerance."""
-    reach: float
-    """Residual from which an observation has no weight in the last fit."""
-    limit: int
-    """The most samples."""
-    seed: int
-    """Of all samples."""
-    rounds: int = ROUNDS
-    """Rounds of `refit_bases`."""
-    sweeps: int = SWEEPS
-    """Sweeps of `settle_ties`."""
 
 
 def fit_together(
@@ -141,7 +168,8 @@ def fit_alone(
     flat = bases.reshape(3, -1)
     lead = np.zeros(len(pixels), np.int32)
     tries, seed = stopping_table(rules.limit), np.uint64(rules.seed)
-    levels = (np.float32(rules.T), np.float32(seen.Ts), np.float32(rules.reach))
+    reach = max(REACH * (seen.noise - LEAST_NOISE * seen.bright), LEAST_REACH * seen.bright)
+    levels = (np.float32(rules.T), np.float32(rules.Ts), np.float32(reach))
 
     def work(start: int, stop: int) -> None:
         some = pixels[start:stop]

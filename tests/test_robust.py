@@ -209,3 +209,32 @@ def test_it_can_be_cancelled_at_any_time(coarse: int, linearize: Linearize) -> N
         talk = Talk(1, cancel=lambda left=left: left.pop() if left else True)
         with pytest.raises(Cancelled, match=r"^linearize was cancelled$"):
             linearize(coarse, talk)
+
+
+# A small object in a large picture
+
+
+@both_ways
+@pytest.mark.parametrize("place", [(0, 0), (70, 330), (400, 500)])
+def test_a_small_object_is_linearized_as_if_the_picture_ended_at_its_rectangle(
+    linearize: Linearize, coarse: int, place: tuple[int, int]
+) -> None:
+    row, column = place
+    images = np.zeros((K, 700, 800), np.float32)
+    images[:, row : row + 300, column : column + 300] = scene().stack.images
+    mask = np.zeros((700, 800), bool)
+    mask[row : row + 300, column : column + 300] = True
+    bases, lead = linearize(coarse, images=images, mask=mask)
+    alone, alone_lead = linearize(coarse)
+    np.testing.assert_array_equal(bases[:, row : row + 300, column : column + 300], alone)
+    np.testing.assert_array_equal(lead, alone_lead)
+    assert (bases[:, ~mask] == 0).all()
+
+
+def test_an_object_of_one_pixel_is_linearized(linearize: Linearize) -> None:
+    mask = np.zeros(SIZE, bool)
+    mask[150, 150] = True
+    bases, lead = linearize(EVERY, mask=mask)
+    assert lead.shape == (1,)
+    assert np.isfinite(bases[:, 150, 150]).all()
+    assert (bases[:, ~mask] == 0).all()
