@@ -63,7 +63,8 @@ class Confidence:
     diffuse: NDArray[np.uint16]
     """(H,W) images in which it is D."""
     margin: NDArray[np.uint16]
-    """(H,W) votes by which the winner beat the best different solution; 0 by published methods."""
+    """(H,W) votes by which the winner beat the best different solution; all its votes (twice its D
+    plus its S) where highlights known from around it left no other; 0 by published methods."""
     spread: NDArray[np.float32]
     """(H,W) 0 where the lights of its D observations lie in a plane, 1 where they spread evenly."""
     support: NDArray[np.float64]

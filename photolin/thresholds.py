@@ -27,6 +27,8 @@ CLEAR = 2.5
 DEEP, FEWEST_DEEP = 0.05, 100
 """How far below 0 an attached shadow is, as a share of the brightest grays, to be one for sure,
 and how many of these show the noise."""
+LOUD = 0.1
+"""Such noise, as a share of the brightest grays, from which it is the fit that is wrong."""
 ONE_SIDED = 0.1
 """Median of noise that is clipped at 0, in standard deviations; light from elsewhere has more."""
 
@@ -131,12 +133,12 @@ def clipped_noise(images: NDArray[np.float32], found: Factorization) -> float:
     Args:
         images: (K,M)
     """
-    l = found.coefficients.astype(np.float32) @ found.bases
-    deep = images[l < -DEEP * np.quantile(images, 0.99)]
+    l, bright = found.coefficients.astype(np.float32) @ found.bases, np.quantile(images, 0.99)
+    deep = images[l < -DEEP * bright]
     if deep.size < FEWEST_DEEP:
         return 0.0
     middle, upper = np.quantile(deep, (0.5, 0.8413))
-    return float(upper) if middle <= ONE_SIDED * upper else 0.0
+    return float(upper) if middle <= ONE_SIDED * upper and upper < LOUD * bright else 0.0
 
 
 def find_starts(

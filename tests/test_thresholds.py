@@ -54,6 +54,12 @@ def test_faint_light_in_attached_shadows_is_not_taken_for_noise() -> None:
     np.testing.assert_allclose(clipped_noise(3 * noise, found), 3 * clipped_noise(noise, found))
 
 
+def test_a_fit_that_calls_lit_pixels_shadows_says_nothing_of_the_noise() -> None:
+    found = Factorization(np.eye(3), -np.ones((3, 500), np.float32), 0, NO_NOISE)
+    lit = np.random.default_rng(0).normal(0, 0.5, (3, 500)).clip(0, 1).astype(np.float32)
+    assert clipped_noise(lit, found) == 0
+
+
 def test_few_attached_shadows_say_nothing_of_the_noise() -> None:
     found = Factorization(np.eye(3), -np.ones((3, 10), np.float32), 0, NO_NOISE)
     few = np.tile(np.array([0, 0, 0, 0.02, 0.03], np.float32), (3, 2))
