@@ -43,29 +43,31 @@ def test_broad_noise_that_is_clipped_at_black_is_not_taken_for_black_shadows(nam
     assert 0.065 <= t.Ts <= 0.085
 
 
+def noise_of(shadows: np.ndarray) -> float:
+    """What these attached shadows (3,M) show beside as many lit pixels of intensity 0.8."""
+    lit = np.full_like(shadows, 0.8)
+    bases = np.concatenate([-lit, lit], axis=1)
+    found = Factorization(np.eye(3), bases, 0, NO_NOISE)
+    return clipped_noise(np.concatenate([shadows, lit], axis=1), found)
+
+
 def test_faint_light_in_attached_shadows_is_not_taken_for_noise() -> None:
     """Interreflection there says nothing of the shadow level elsewhere."""
-    found = Factorization(np.eye(3), -np.ones((3, 500), np.float32), 0, NO_NOISE)
-    rng = np.random.default_rng(0)
-    light = np.abs(rng.normal(0.02, 0.005, (3, 500))).astype(np.float32)
-    assert clipped_noise(light, found) == 0
-    noise = rng.normal(0, 0.02, (3, 500)).clip(0).astype(np.float32)
-    np.testing.assert_allclose(clipped_noise(noise, found), 0.02, rtol=0.1)
-    np.testing.assert_allclose(clipped_noise(3 * noise, found), 3 * clipped_noise(noise, found))
+    noise = np.random.default_rng(0).normal(0, 0.02, (3, 500)).astype(np.float32)
+    assert noise_of(np.abs(noise)) == 0
+    np.testing.assert_allclose(noise_of(noise.clip(0)), 0.02, rtol=0.1)
+    np.testing.assert_allclose(noise_of(3 * noise.clip(0)), 3 * noise_of(noise.clip(0)))
 
 
 def test_a_fit_that_calls_lit_pixels_shadows_says_nothing_of_the_noise() -> None:
-    found = Factorization(np.eye(3), -np.ones((3, 500), np.float32), 0, NO_NOISE)
     lit = np.random.default_rng(0).normal(0, 0.5, (3, 500)).clip(0, 1).astype(np.float32)
-    assert clipped_noise(lit, found) == 0
+    assert noise_of(lit) == 0
 
 
 def test_few_attached_shadows_say_nothing_of_the_noise() -> None:
-    found = Factorization(np.eye(3), -np.ones((3, 10), np.float32), 0, NO_NOISE)
     few = np.tile(np.array([0, 0, 0, 0.02, 0.03], np.float32), (3, 2))
-    assert clipped_noise(few, found) == 0
-    many = Factorization(np.eye(3), -np.ones((3, 100), np.float32), 0, NO_NOISE)
-    assert clipped_noise(np.tile(few, 10), many) > 0
+    assert noise_of(few) == 0
+    assert noise_of(np.tile(few, 10)) > 0
 
 
 def test_more_noise_gives_a_larger_tolerance() -> None:
