@@ -22,6 +22,9 @@ from .sample import Sample
 COARSE = (6.0, 4.0, 3.0)
 """T during alternation, in units of T."""
 MAX_T = 0.3
+FLAT = 0.002
+"""Root mean square of what the directions of (i1, i2, i3) have out of one plane; as little as this
+noise alone could make."""
 ROUGH_PIXELS = 1000
 FINALISTS = 2
 """Starts, of all tried, that are followed beyond the first alternation."""
@@ -123,8 +126,8 @@ def start_coefficients(
 ) -> NDArray[np.float64] | None:
     """(K,3) coefficients of Eq. (2) with raw base images, from pixels lit in all three.
 
-    None where they are not determined: no image fits, or the base images differ in fewer than
-    three ways by more than a tenth of T, which noise alone could do.
+    None where they are not determined: no image fits, or the base images hardly differ in three
+    ways (see FLAT).
     """
     bases = sample.images[list(triple)].copy()
     lit = ((bases >= thresholds.Ts) & (bases > 0)).all(axis=0)
@@ -132,7 +135,7 @@ def start_coefficients(
     unit /= np.linalg.norm(unit, axis=0)
     spread = np.linalg.svd(unit, compute_uv=False)[-1] if lit.sum() >= 3 else 0
     T = min(max(3 * thresholds.T, 0.1), MAX_T)
-    if spread <= min(thresholds.T, MAX_T / 3) / 10 * np.sqrt(lit.sum()):
+    if spread <= FLAT * np.sqrt(lit.sum()):
         return None
     bases[:, ~lit] = np.nan
     return fit_coefficients(sample, bases, T, thresholds.Ts, seed, limit)

@@ -89,7 +89,6 @@ def follow_thresholds(
         found = refine_coefficients(
             ground.sample,
             near.coefficients,
-            thresholds.T,
             thresholds.Ts,
             options.seed,
             quick.samples,

@@ -53,7 +53,6 @@ HESSIAN_OBSERVATIONS, HESSIAN_PIXELS = 20_000, 300
 def refine_coefficients(
     sample: Sample,
     coefficients: NDArray[np.float64],
-    T: float | None,
     Ts: float,
     seed: int,
     limit: int,
@@ -62,13 +61,12 @@ def refine_coefficients(
 ) -> Factorization:
     """The factorization that best explains the diffuse observations, from rough coefficients.
 
-    Each round fits bases by consensus, weighs D observations by their residual (a Gaussian whose
-    width is annealed down to the noise, so that highlight tails lose their say), and takes a
-    Gauss-Newton step in all coefficients.
+    Each round fits bases by consensus within a tolerance that follows the noise, weighs D
+    observations by their residual (a Gaussian whose width is annealed down to the noise, so that
+    highlight tails lose their say), and takes a Gauss-Newton step in all coefficients.
 
     Args:
         coefficients: (K,3)
-        T: relative tolerance; None: follows the noise that is found.
         rounds: how many at most; with a few, only the last ones of the annealing, for coefficients
             that are nearly right.
 
@@ -88,7 +86,7 @@ def refine_coefficients(
             some = sample
         if cancel is not None and cancel():
             raise Cancelled("coefficients was cancelled")
-        wanted = max(CUT * noise.relative, MIN_T) if T is None else T
+        wanted = max(CUT * noise.relative, MIN_T)
         tolerance = max(min(wanted, FIRST_T), FIRST_T * 0.5**round_)
         bases, score = fit_bases(some, c, tolerance, Ts, seed, limit)
         noise = measure_noise(some.images, c, bases, tolerance, Ts)

@@ -109,12 +109,16 @@ def linearize_sample(
     lights: NDArray[np.float64] | None,
     cancel: Cancel | None,
 ) -> Factorization:
-    """Coefficients (those of the lights, where known) and bases of the sample, and the noise."""
-    T, seed, limit = options.T, options.seed, options.samples
+    """Coefficients (those of the lights, where known) and bases of the sample, and the noise.
+
+    The tolerance follows the noise, whatever `options.T` is: a T that calls noise undefined would
+    only hide what the observations say of the coefficients.
+    """
+    seed, limit = options.seed, options.samples
     if lights is None:
-        first = Thresholds(FIRST_T if T is None else T, Ts)
+        first = Thresholds(FIRST_T, Ts)
         rough = search_coefficients(sample, starts, first, seed, limit, cancel)
-        return refine_coefficients(sample, rough, T, Ts, seed, limit, cancel)
+        return refine_coefficients(sample, rough, Ts, seed, limit, cancel)
     c = orthogonalize(lights)
 
     def at(tolerance: float) -> Factorization:
@@ -122,7 +126,7 @@ def linearize_sample(
         noise = measure_noise(sample.images, c, bases, tolerance, Ts)
         return Factorization(c, bases, int(score[score > 0].sum()), noise)
 
-    return at(follow_noise(at(FIRST_T).noise) if T is None else T)
+    return at(follow_noise(at(FIRST_T).noise))
 
 
 def clipped_noise(images: NDArray[np.float32], found: Factorization) -> float:

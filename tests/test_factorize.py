@@ -44,7 +44,7 @@ def test_any_base_images_lead_to_the_lights_of_diffuse_images(
 ) -> None:
     sample, lights = diffuse
     rough = search_coefficients(sample, [triple], THRESHOLDS, 0, 500)
-    found = refine_coefficients(sample, rough, 0.02, 0.01, 0, 500)
+    found = refine_coefficients(sample, rough, 0.01, 0, 500)
     assert light_error(found.coefficients, lights) < 1e-3
     np.testing.assert_allclose(found.coefficients @ found.bases, sample.images, atol=1e-5)
     assert found.score == sample.images.size
@@ -106,7 +106,7 @@ def test_a_dominant_plane_does_not_fool_it() -> None:
     scene = render_scene("sphere_cone", size=(60, 80))
     sample, t = draw_sample(scene.stack, 0), Thresholds(0.01, 0.003)
     rough = search_coefficients(sample, [(0, 3, 10), (1, 2, 9)], t, 0, 500)
-    found = refine_coefficients(sample, rough, 0.01, 0.003, 0, 500)
+    found = refine_coefficients(sample, rough, 0.003, 0, 500)
     assert light_error(rough, scene.truth.lights) < 3
     assert light_error(found.coefficients, scene.truth.lights) < 0.3
 
@@ -119,7 +119,7 @@ def test_narrow_lights_and_shallow_relief_are_solved(width: float, relief: float
     sample = draw_sample(wrap((lights @ normals).reshape(12, 30, 30)), 0)
     starts = [(0, 1, 2), (3, 4, 5), (6, 7, 8)]
     rough = search_coefficients(sample, starts, THRESHOLDS, 0, 500)
-    found = refine_coefficients(sample, rough, 0.02, 0.01, 0, 500)
+    found = refine_coefficients(sample, rough, 0.01, 0, 500)
     assert light_error(found.coefficients, lights) < 0.01
 
 
@@ -160,4 +160,4 @@ def test_it_can_be_cancelled(diffuse: tuple[Sample, np.ndarray]) -> None:
     with pytest.raises(Cancelled):
         search_coefficients(diffuse[0], [(0, 1, 2)], THRESHOLDS, 0, 500, cancel=lambda: True)
     with pytest.raises(Cancelled):
-        refine_coefficients(*diffuse, 0.02, 0.01, 0, 500, cancel=lambda: True)
+        refine_coefficients(*diffuse, 0.01, 0, 500, cancel=lambda: True)

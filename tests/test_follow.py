@@ -196,7 +196,7 @@ def test_a_part_with_little_or_nothing_in_the_mask_is_followed(inside: int) -> N
 def test_coefficients_nearly_right_take_as_few_rounds_as_asked_for(rounds: int) -> None:
     """The last round is on the whole sample, at the width of the noise."""
     asked: list[int] = []
-    known = (GROUND.sample, NEAR.coefficients, OTHER.T, OTHER.Ts, 0, SAMPLES)
+    known = (GROUND.sample, NEAR.coefficients, OTHER.Ts, 0, SAMPLES)
     found = refine_coefficients(*known, lambda: bool(asked.append(1)), rounds)
     assert len(asked) == rounds
     assert found.bases.shape == (3, PIXELS)

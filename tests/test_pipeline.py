@@ -84,6 +84,22 @@ def test_scaling_an_image_scales_its_coefficients_and_linearized_image(
     np.testing.assert_allclose(after.linearized(3), factor * before.linearized(3), atol=1e-4)
 
 
+@pytest.mark.parametrize("images", ["scene", "noise", "lights"])
+def test_thresholds_that_were_suggested_give_the_same_bytes_when_they_are_given(
+    images: str,
+) -> None:
+    """So that a command copied with them reproduces what is on screen."""
+    scene = render_scene("cup", size=(60, 80), noise=0.03, bits=None, seed=5)
+    stack = noisy() if images == "noise" else scene.stack
+    if images == "lights":
+        power = scene.truth.power[:, None]
+        stack = replace(stack, lights=(scene.truth.lights * power).astype(np.float64))
+    suggested = analyze(stack)
+    t = suggested.thresholds
+    for given in (Options(T=t.T, Ts=t.Ts), Options(T=t.T), Options(Ts=t.Ts)):
+        assert same_bytes(analyze(stack, given), suggested)
+
+
 @each_method
 def test_permuting_the_images_permutes_the_result(method: Method) -> None:
     """Labels exactly; the published step 1 samples pixels, hence is exact too; which images a pixel
