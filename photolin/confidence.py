@@ -38,7 +38,7 @@ def measure_confidence(
     coefficients: NDArray[np.float64],
     bases: NDArray[np.float32],
     labels: NDArray[np.uint8],
-    margin: NDArray[np.int32],
+    margin: NDArray[np.uint16],
     thresholds: Thresholds,
     quality: Quality,
     threads: int | None = None,
@@ -63,9 +63,8 @@ def measure_confidence(
     run_blocks(work, H * W, BLOCK, threads=threads)
     lit[~stack.mask.reshape(-1)] = 0
     lead = np.zeros((H, W), np.uint16)
-    lead[stack.mask] = np.minimum(margin, np.iinfo(np.uint16).max)
-    step = max(1, len(stack.pixels) // JUDGES)
-    some = stack.pixels[::step]
+    lead[stack.mask] = margin
+    some = stack.pick(np.arange(0, len(margin), max(1, len(margin) // JUDGES)))
     seen = X[:, some]
     saturated = seen >= quality.white[:, None]
     # what is saturated is darker than it should be; as 0 it is not lit
@@ -122,8 +121,9 @@ def judge_images(
 
 def find_doubts(stack: ImageStack, confidence: Confidence, thresholds: Thresholds) -> list[str]:
     """Sentences on what is wrong or cannot be told, each with the number that says so."""
-    mask = stack.mask
-    few, unlit = confidence.lit[mask] < FEW, confidence.lit[mask] < 3
+    lit = confidence.lit[stack.mask]
+    few, unlit = lit < FEW, lit < 3
+    del lit
     doubts = []
     if unlit.any():
         doubts.append(
@@ -166,7 +166,7 @@ def doubt_images(stack: ImageStack, confidence: Confidence) -> list[str]:
     support, gain = confidence.support, confidence.gain
     usual = np.median(support)
     # the last: shares of few pixels say little
-    slack = max(MISFIT, 5 * np.median(np.abs(support - usual)), 2 / np.sqrt(len(stack.pixels)))
+    slack = max(MISFIT, 5 * np.median(np.abs(support - usual)), 2 / np.sqrt(stack.mask.sum()))
     for k in np.flatnonzero(support < usual - slack):
         doubts.append(
             f"image {k} ({stack.names[k]}) does not fit the others: {100 * (1 - support[k]):.0f} % "

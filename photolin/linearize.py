@@ -16,7 +16,7 @@ from .stack import ImageStack
 
 BLOCK = 4096
 
-Work = Callable[[int, int, NDArray[np.float32], NDArray[np.int32]], None]
+Work = Callable[[int, int, NDArray[np.float32]], None]
 
 
 def linearize(
@@ -29,7 +29,7 @@ def linearize(
     threads: int | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+) -> tuple[NDArray[np.float32], NDArray[np.uint16]]:
     """Linearized bases of all mask pixels.
 
     `robust` samples among the images in which a pixel is lit until enough is known, then fits all
@@ -52,11 +52,13 @@ def linearize(
     if options.method == "robust":
         known = quality or Quality(np.full(len(stack.images), np.inf, np.float32), 0.0)
         talk = Talk(threads, progress, cancel)
-        return linearize_robustly(
+        bases, lead = linearize_robustly(
             stack.images, stack.mask, coefficients, thresholds, options, known, talk
         )
+        return bases, np.minimum(lead, np.iinfo(np.uint16).max).astype(np.uint16)
     work = shared_samples_work(stack, coefficients, base_images, thresholds, options)
-    return fit_pixels(stack, work, threads, progress, cancel)
+    bases = fit_pixels(stack, work, threads, progress, cancel)
+    return bases, np.zeros(np.count_nonzero(stack.mask), np.uint16)
 
 
 def fit_pixels(
@@ -65,27 +67,27 @@ def fit_pixels(
     threads: int | None,
     progress: Progress | None,
     cancel: Cancel | None,
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Bases (3,H,W) and margin (P,) of all mask pixels, a block at a time."""
+) -> NDArray[np.float32]:
+    """Bases (3,H,W) of all mask pixels, a block at a time."""
     _, H, W = stack.shape
     bases = np.zeros((3, H * W), np.float32)
-    margin = np.zeros(len(stack.pixels), np.int32)
+    pixels = stack.pixels
 
     def block(start: int, stop: int) -> None:
         out = np.full((stop - start, 3), np.nan, np.float32)
-        work(start, stop, out, margin[start:stop])
-        bases[:, stack.pixels[start:stop]] = out.T
+        work(start, stop, out)
+        bases[:, pixels[start:stop]] = out.T
 
     run_blocks(
         block,
-        len(stack.pixels),
+        len(pixels),
         BLOCK,
         threads=threads,
         stage="linearize",
         progress=progress,
         cancel=cancel,
     )
-    return bases.reshape(3, H, W), margin
+    return bases.reshape(3, H, W)
 
 
 def shared_samples_work(
@@ -97,7 +99,7 @@ def shared_samples_work(
 ) -> Work:
     """Shared samples on one block of pixels, the winner by support or by centre of gravity."""
     X = stack.images.reshape(len(stack.images), -1)
-    others = np.setdiff1d(np.arange(len(X)), base_images)
+    pixels, others = stack.pixels, np.setdiff1d(np.arange(len(X)), base_images)
     rng = np.random.default_rng([options.seed, 2])
     drawn, inverses = draw_samples(coefficients[others].T, options.samples, rng)
     if len(drawn) == 0:
@@ -110,8 +112,8 @@ def shared_samples_work(
     keep = int(np.ceil(KEEP * len(triples)))
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
 
-    def work(start: int, stop: int, out: NDArray[np.float32], _: NDArray[np.int32]) -> None:
-        rows = np.ascontiguousarray(X[:, stack.pixels[start:stop]].T)
+    def work(start: int, stop: int, out: NDArray[np.float32]) -> None:
+        rows = np.ascontiguousarray(X[:, pixels[start:stop]].T)
         if options.method == "statistical":
             centre_rows(rows, triples, inverses, keep, out, 0, len(rows))
         else:

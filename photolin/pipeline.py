@@ -19,7 +19,7 @@ from .factors import Thresholds
 from .label import label_images
 from .linearize import Quality, linearize
 from .near_light import compare_regions
-from .sample import Sample, choose_pixels, draw_sample
+from .sample import Sample, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
 from .thresholds import Suggestion, suggest_from_sample
@@ -155,9 +155,7 @@ def doubt_lights(
         return []
     few, known = sample.thin(DOUBTED_PIXELS), found.thin(DOUBTED_PIXELS)
     plane = fit_plane(few, known, thresholds) if stack.lights is None else None
-    pixels = choose_pixels(stack, options.seed)
-    pixels = pixels[:: max(1, len(pixels) // DOUBTED_PIXELS)]
-    rows, columns = np.divmod(pixels, stack.shape[2])
+    rows, columns = np.divmod(few.places, stack.shape[2])
     regions = compare_regions(few, rows, columns, known, thresholds)
     # where one dimension is noise, it differs between parts of the picture too
     return doubt_dimensions(plane) or doubt_distance(regions)

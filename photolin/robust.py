@@ -19,6 +19,8 @@ from .settle import SWEEPS, settle_ties
 BLOCK = 4096
 TURNED = 1 << 16
 """Pixels whose bases are brought into the frame of the base images at once."""
+BRIGHTEST = 1000
+"""Pixels that show how bright the brightest grays are, at least."""
 REACH = 4.0
 """Residual, in units of the noise, from which an observation has no weight in the last fit."""
 LEAST_REACH = 0.003
@@ -106,12 +108,13 @@ def fit_picture(
     q, r = np.linalg.qr(coefficients)
     scale = np.sqrt(len(q) / 3)
     factors = np.ascontiguousarray((q * scale).T, np.float32)
-    pixels = np.flatnonzero(mask)
-    some = images.reshape(len(images), -1)[:, pixels[:: max(1, len(pixels) // 1000)]]
+    count = int(np.count_nonzero(mask))
+    thin = slice(None, None, max(1, count // BRIGHTEST))
+    some = images.reshape(len(images), -1)[:, thin][:, mask.reshape(-1)[thin]]
     bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
     seen = Observations(images, mask, factors, quality.white, rules.Ts, noise, bright)
-    step = choose_step(len(pixels), len(images))
+    step = choose_step(count, len(images))
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
     else:

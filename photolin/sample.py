@@ -18,22 +18,22 @@ class Sample:
     """(K,M) one row an image, fraction of full scale."""
     pixels: NDArray[np.float32]
     """(M,K) the same, one row a pixel."""
+    places: NDArray[np.intp]
+    """(M,) flat indices (row * W + column) of the pixels."""
 
     def thin(self, count: int) -> "Sample":
         """About `count` of the pixels, evenly spaced."""
         step = max(1, self.images.shape[1] // count)
-        return Sample(
-            *(np.ascontiguousarray(a) for a in (self.images[:, ::step], self.pixels[::step]))
-        )
+        thinned = (self.images[:, ::step], self.pixels[::step], self.places[::step])
+        return Sample(*(np.ascontiguousarray(a) for a in thinned))
 
 
 def choose_pixels(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> NDArray[np.intp]:
     """Flat indices of at most `count` mask pixels, drawn without replacement, ascending."""
-    pixels = stack.pixels
-    if len(pixels) > count:
-        rng = np.random.default_rng(seed)
-        pixels = np.sort(rng.choice(pixels, count, replace=False))
-    return pixels
+    size = int(np.count_nonzero(stack.mask))
+    if size <= count:
+        return stack.pixels
+    return stack.pick(np.sort(np.random.default_rng(seed).choice(size, count, replace=False)))
 
 
 def draw_sample(
@@ -52,4 +52,4 @@ def draw_sample(
     images = stack.images.reshape(len(stack.images), -1)[:, pixels]
     if white is not None:
         images = np.where(images < white[:, None], images, np.float32(0))
-    return Sample(np.ascontiguousarray(images), np.ascontiguousarray(images.T))
+    return Sample(np.ascontiguousarray(images), np.ascontiguousarray(images.T), pixels)

@@ -22,8 +22,9 @@ def find_white(stack: ImageStack) -> NDArray[np.float32]:
     """
     images = stack.images.reshape(len(stack.images), -1)
     white = np.full(len(images), np.inf, np.float32)
+    pixels = slice(None) if stack.mask.all() else stack.pixels
     for k, image in enumerate(images):
-        values = image if stack.mask.all() else image[stack.pixels]
+        values = image[pixels]
         top = values.max()
         if top >= 1:
             white[k] = 1

@@ -91,8 +91,9 @@ def is_rough(flat: NDArray[np.float32], trust: NDArray[np.float32], shape: tuple
     turns = []
     for step in (1, shape[1]):
         beside = sure[:-1, 1:] if step == 1 else sure[1:, :-1]
-        at = np.flatnonzero(sure[:-1, :-1] & beside)
-        at = at[:: max(1, len(at) // PAIRS)]
+        pairs = (sure[:-1, :-1] & beside).reshape(-1)
+        every = max(1, int(np.count_nonzero(pairs)) // PAIRS)
+        at = np.flatnonzero(pairs[::every]) * every
         here, there = (
             v / (np.linalg.norm(v, axis=0) + 1e-12) for v in (flat[:, at], flat[:, at + step])
         )

@@ -1,6 +1,6 @@
 """The input: one scene, one camera, K lights."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,6 @@ class ImageStack:
     """Sentences on what reading decided: transfer, channel, dark frame, mask."""
     warnings: tuple[str, ...] = ()
     """Sentences on what looks wrong with the input."""
-    pixels: NDArray[np.intp] = field(init=False, repr=False)
-    """(P,) flat indices (row * W + column) of the mask pixels, ascending."""
 
     def __post_init__(self) -> None:
         check_images(self.images, self.title)
@@ -44,10 +42,19 @@ class ImageStack:
             )
         if self.lights is not None:
             check_lights(self.lights, len(self.images), self.title)
-        object.__setattr__(self, "pixels", np.flatnonzero(self.mask))
-        for array in (self.images, self.mask, self.lights, self.pixels):
+        for array in (self.images, self.mask, self.lights):
             if array is not None:
                 array.setflags(write=False)
+
+    @property
+    def pixels(self) -> NDArray[np.intp]:
+        """(P,) flat indices (row * W + column) of the mask pixels, ascending; not kept, for they
+        are as large as two images."""
+        return np.flatnonzero(self.mask)
+
+    def pick(self, ranks: NDArray[np.intp]) -> NDArray[np.intp]:
+        """`pixels[ranks]`, without the list of all where the mask leaves none out."""
+        return ranks if self.mask.all() else self.pixels[ranks]
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -9,10 +9,9 @@ from lambert import lambertian, wrap
 
 from photolin import analyze, render_scene
 from photolin.analysis import METHODS, Analysis, Confidence, Method, Options
-from photolin.confidence import judge_images, measure_confidence
+from photolin.confidence import judge_images
 from photolin.errors import PhotolinError
 from photolin.factors import Factor, Thresholds
-from photolin.linearize import Quality
 from photolin.stack import ImageStack
 from photolin.synthetic import SCENES, Scene
 from photolin.synthetic import render as render_module
@@ -105,17 +104,6 @@ def test_images_without_lit_pixels_are_not_judged() -> None:
     for i, l in ((dark, dark.astype(float)), (dark + 1, unknown)):
         judged = judge_images(i.astype(np.float32), l, Thresholds(0.05, 0), 0.0)
         assert [float(values[0]) for values in judged] == [1, 0, 1]
-
-
-def test_large_margins_are_cut_off_rather_than_turned_over() -> None:
-    stack, _ = lambertian()
-    a = analyze(stack)
-    quality = Quality(np.full(10, np.inf, np.float32), 0.0)
-    margin = np.full(720, 70_000, np.int32)
-    c = measure_confidence(
-        *(stack, a.coefficients, a.linearized_bases, a.labels, margin, a.thresholds, quality)
-    )
-    assert (c.margin == 65_535).all()
 
 
 @pytest.mark.parametrize("threads", [1, 3])

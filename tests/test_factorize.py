@@ -68,7 +68,9 @@ def test_bases_of_a_pixel_lit_in_two_images_are_undetermined(
     sample, lights = diffuse
     images = sample.images.copy()
     images[2:, 7] = 0
-    bases, _ = fit_bases(Sample(images, images.T.copy()), lights, 0.02, 0.01, 0, 500)
+    bases, _ = fit_bases(
+        Sample(images, images.T.copy(), np.arange(images.shape[1])), lights, 0.02, 0.01, 0, 500
+    )
     assert np.argwhere(np.isnan(bases)).tolist() == [[r, 7] for r in range(3)]
 
 
@@ -150,7 +152,7 @@ def test_a_start_needs_pixels_lit_in_all_three(diffuse: tuple[Sample, np.ndarray
     images = diffuse[0].images.copy()
     for k in range(3):
         images[k, np.arange(images.shape[1]) % 3 == k] = 0
-    sample = Sample(images, images.T.copy())
+    sample = Sample(images, images.T.copy(), np.arange(images.shape[1]))
     for Ts in (0.01, 0.0):
         assert start_coefficients(sample, (0, 1, 2), Thresholds(0.02, Ts), 0, 500) is None
         assert start_coefficients(sample, (3, 4, 5), Thresholds(0.02, Ts), 0, 500) is not None

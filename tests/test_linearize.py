@@ -128,3 +128,12 @@ def test_it_can_be_cancelled(method: Method) -> None:
             Options(method=method),
             cancel=lambda: True,
         )
+
+
+def test_large_margins_are_cut_off_rather_than_turned_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    stack, lights = lambertian()
+    lead = np.full(720, 70_000, np.int32)
+    monkeypatch.setattr(module, "linearize_robustly", lambda *_: (np.zeros((3, 24, 30)), lead))
+    _, margin = linearize(stack, coefficients(lights), BASES, THRESHOLDS, Options())
+    assert margin.dtype == np.uint16
+    assert (margin == 65_535).all()

@@ -35,7 +35,7 @@ def test_pixels_are_the_flat_indices_of_the_mask_in_order() -> None:
 
 def test_nothing_of_a_stack_can_be_changed() -> None:
     s = replace(stack(), lights=lights())
-    for array in (s.images, s.mask, s.lights, s.pixels):
+    for array in (s.images, s.mask, s.lights):
         assert array is not None
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0

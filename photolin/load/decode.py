@@ -142,7 +142,7 @@ def _describe(picture: Picture) -> str:
 def _fit(images: NDArray[np.float32], top: float, plan: Plan) -> list[str]:
     """Bring `images` into [0, 1] in place, and say how."""
     notes = []
-    below = int(np.count_nonzero(images < 0))
+    below = count_below(images)
     if plan.dark is not None:
         notes.append(f"dark frame: observations below it, taken as 0: {below}")
     elif below:
@@ -152,9 +152,14 @@ def _fit(images: NDArray[np.float32], top: float, plan: Plan) -> list[str]:
         notes.append(f"scale: values go up to {top:.6g}; all images are divided by that")
     if plan.offset:
         images -= np.float32(plan.offset)
-        dim = int(np.count_nonzero(images < 0))
+        dim = count_below(images)
         notes.append(
             f"offset: {plan.offset:g} is subtracted; observations below it, taken as 0: {dim}"
         )
     np.maximum(images, 0, out=images)
     return notes
+
+
+def count_below(images: NDArray[np.float32]) -> int:
+    """Observations below 0, counted an image at a time to save memory."""
+    return sum(int(np.count_nonzero(image < 0)) for image in images)
