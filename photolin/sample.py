@@ -24,8 +24,10 @@ class Sample:
     def thin(self, count: int) -> "Sample":
         """About `count` of the pixels, evenly spaced."""
         step = max(1, self.images.shape[1] // count)
-        thinned = (self.images[:, ::step], self.pixels[::step], self.places[::step])
-        return Sample(*(np.ascontiguousarray(a) for a in thinned))
+        images, pixels = self.images[:, ::step], self.pixels[::step]
+        return Sample(
+            np.ascontiguousarray(images), np.ascontiguousarray(pixels), self.places[::step]
+        )
 
 
 def choose_pixels(stack: ImageStack, seed: int, count: int = SAMPLE_PIXELS) -> NDArray[np.intp]:

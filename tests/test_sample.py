@@ -22,6 +22,7 @@ def test_a_sample_holds_different_mask_pixels_in_order_and_both_layouts(count: i
     assert s.pixels.flags.c_contiguous
     assert s.images.flags.c_contiguous
     pixels = np.rint(s.images[0] * 7 * 400).astype(int) - 1
+    np.testing.assert_array_equal(s.places, pixels)
     assert (np.diff(pixels) > 0).all()
     assert mask.ravel()[pixels].all()
     np.testing.assert_array_equal(s.images, numbered(mask).reshape(6, -1)[:, pixels].astype("f4"))
@@ -46,4 +47,5 @@ def test_thinning_keeps_evenly_spaced_pixels(count: int, left: int) -> None:
     thin = s.thin(count)
     assert thin.images.shape[1] == left
     np.testing.assert_array_equal(thin.pixels, thin.images.T)
+    np.testing.assert_array_equal(thin.places, s.places[:: 100 // min(count, 100)])
     np.testing.assert_array_equal(thin.images, s.images[:, :: 100 // min(count, 100)])

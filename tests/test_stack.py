@@ -30,6 +30,8 @@ def test_pixels_are_the_flat_indices_of_the_mask_in_order() -> None:
     mask[[0, 3, 2], [4, 1, 2]] = True
     s = replace(stack(), mask=mask)
     np.testing.assert_array_equal(s.pixels, [4, 12, 16])
+    np.testing.assert_array_equal(s.pick(np.array([2, 0])), [16, 4])
+    np.testing.assert_array_equal(stack().pick(np.array([7, 3])), [7, 3])
     assert s.shape == (6, 4, 5)
 
 
