@@ -295,10 +295,10 @@ def test_the_linearization_follows_T_and_ends_in_that_of_a_run(page: Any, app: A
     for keys in ("[" * 9, "}" * 3):
         press(page, *keys)
         state = session._read()
-        wait_until(lambda: session._results["robust"].thresholds == session._read().thresholds)
+        wait_until(lambda: session._work.results["robust"].thresholds == session._read().thresholds)
         state = session._read()
         expected = analyze(STACK, replace(OPTIONS, T=state.T, Ts=state.Ts))
-        assert np.array_equal(session._results["robust"].labels, expected.labels)
+        assert np.array_equal(session._work.results["robust"].labels, expected.labels)
         wait_for_colours(page, blended(picture(0), expected.labels[0]), tolerance=1)
         wait_for_text(page, f"T {state.T:.4f}, Ts {state.Ts:.4f}: final")
 
@@ -365,10 +365,10 @@ def test_dragging_T_for_five_seconds_shows_linearizations_and_ends_in_the_last(
     page.mouse.up()
     times = np.array([when for when, _, _ in shown])
     distinct = len({encoded for _, _, encoded in shown})
-    wait_until(lambda: session._results["robust"].thresholds == session._read().thresholds, 30)
+    wait_until(lambda: session._work.results["robust"].thresholds == session._read().thresholds, 30)
     last = session._read().thresholds
-    expected = analyze(stack, replace(first.options, T=last.T, Ts=last.Ts))
-    found = session._results["robust"]
+    expected = analyze(stack, replace(OPTIONS, T=last.T, Ts=last.Ts))
+    found = session._work.results["robust"]
     assert np.array_equal(found.labels, expected.labels)
     assert np.array_equal(found.linearized_bases, expected.linearized_bases, equal_nan=True)
     wait_until(lambda: shown[-1][2] == encode_labels(expected.labels[0]))
@@ -738,7 +738,7 @@ def test_linearizing_again_can_be_cancelled_and_says_what_the_bases_belong_to(
     page.get_by_role("button", name="Cancel").click()
     wait_for_text(page, "linearization cancelled; the earlier result is kept")
     assert page.get_by_text("coefficients was cancelled").count() == 0
-    assert session._results == {"robust": RESULT}
+    assert session._work.results == {"robust": RESULT}
     wait_for_colours(page, blended(picture(0), labels_at(session)), tolerance=1)
 
     gate.release.set()
@@ -762,8 +762,8 @@ def test_methods_are_computed_once_and_kept_even_if_asked_for_while_one_runs(
     wait_until(lambda: session._read().method == "statistical")
     assert [options.method for options in gate.began] == ["classification"]
     gate.release.set()
-    wait_until(lambda: set(session._results) == {"robust", "classification", "statistical"})
-    statistical = session._results["statistical"]
+    wait_until(lambda: set(session._work.results) == {"robust", "classification", "statistical"})
+    statistical = session._work.results["statistical"]
     expected = blended(picture(0), labels_at(session, statistical))
     wait_for_part(page, expected, away_from(30), tolerance=1)
 
@@ -786,8 +786,8 @@ def test_two_methods_are_compared_in_percentages_plots_and_sentences(
     session = enter(page, open_app(result=RESULT))
     choose(page, session._pixel_view._beside, "statistical")
     wait_for_text(page, "Click a pixel to see why robust and statistical label it as they do.")
-    wait_until(lambda: "statistical" in session._results)
-    other = session._results["statistical"]
+    wait_until(lambda: "statistical" in session._work.results)
+    other = session._work.results["statistical"]
     here, there = labels_at(session), labels_at(session, other)
     differing = np.argwhere((here != there) & STACK.mask)
     assert len(differing)
@@ -812,10 +812,10 @@ def test_a_first_run_that_is_cancelled_says_how_to_go_on(
     wait_for_text(page, "There is no result by robust yet")
     press(page, "Escape")
     wait_for_text(page, "linearization cancelled; linearize again starts anew")
-    assert session._results == {}
+    assert session._work.results == {}
     gate.release.set()
     page.get_by_role("button", name="linearize again").click()
-    wait_until(lambda: "robust" in session._results)
+    wait_until(lambda: "robust" in session._work.results)
 
 
 # --- exports ---

@@ -2,14 +2,12 @@
 
 Widgets and the canvas only report that something changed. One worker thread re-reads them all,
 makes a new ViewState and draws what differs; changes that arrive meanwhile make one more round, so
-the last value always wins and nothing is drawn twice. Long work runs in a thread of its own and
-reports through the same worker.
+the last value always wins and nothing is drawn twice. Long work (`work`) runs in a thread of its
+own and reports through the same worker.
 """
 
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from threading import Event, Thread
 from time import monotonic
@@ -18,15 +16,14 @@ from typing import Literal
 import viser
 
 from photolin.analysis import Analysis, Method
-from photolin.errors import Cancelled, OptionError, PhotolinError
+from photolin.errors import Cancelled, PhotolinError
 from photolin.factors import LETTERS, Thresholds
 
 from .canvas import Canvas, Pixel, Window
 from .catch_up import CatchUp
-from .downloads import Pack, make_download, relabel
+from .downloads import Pack
 from .frame import Frame, compose
-from .job import Job
-from .live import Live, Preview, is_behind
+from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
 from .state import ViewState
@@ -39,6 +36,7 @@ from .views.run import RunView
 from .views.shares import SharesView
 from .views.summary import SummaryView
 from .views.thresholds import ThresholdView
+from .work import Desk, Work
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
@@ -47,19 +45,13 @@ PATIENCE = 0.25
 FIRST = Thresholds(0.05, 0.02)
 """Where the sliders stand until thresholds are given or suggested."""
 
-EMPTY = "linearize again starts anew"
-"""What follows from cancelling the first run."""
-
 
 class Session:
     """The widgets, the state and the worker of one tab."""
 
     def __init__(self, client: viser.ClientHandle, runs: Runs, pack: Pack) -> None:
         """Build the tab and start to work for it."""
-        self._client, self._runs, self._stack, self._pack = client, runs, runs.stack, pack
-        self._results: dict[Method, Analysis] = {}
-        self._declined: frozenset[Method] = frozenset()
-        """Methods that were cancelled or failed; not tried again unasked."""
+        self._client, self._runs, self._stack = client, runs, runs.stack
         self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
         self._pixel: Pixel | None = None
@@ -67,22 +59,21 @@ class Session:
         T, Ts = runs.options.T, runs.options.Ts
         self._first = Thresholds(FIRST.T if T is None else T, FIRST.Ts if Ts is None else Ts)
         if runs.result is not None:
-            self._results[runs.result.options.method] = runs.result
             self._first = runs.result.thresholds
         self._wake, self._closed = Event(), Event()
-        self._job = Job(self._guarded, self._wake.set)
         self._live = Live(self._stack)
         self._window: Window | None = None
-        self._catch_up = CatchUp(runs, self._deliver, self._tell, self._wake.set)
+        self._work = Work(runs, pack, self._first, self._desk())
+        self._catch_up = CatchUp(runs, self._work.deliver, self._tell, self._wake.set)
         self._changed = monotonic()
         self._build(client)
         self._wake.set()
-        Thread(target=self._work, name="tab", daemon=True).start()
+        Thread(target=self._draw, name="tab", daemon=True).start()
 
     def close(self) -> None:
         """Stop all work for the tab."""
         self._closed.set()
-        self._job.close()
+        self._work.close()
         self._catch_up.close()
         self._wake.set()
 
@@ -99,9 +90,9 @@ class Session:
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self._picture = PictureView(gui, self._stack, changed, canvas.fit, canvas.one_to_one)
             self._thresholds = ThresholdView(
-                gui, self._first, changed, self._suggest, self._linearize_again
+                gui, self._first, changed, self._work.suggest, self._work.linearize
             )
-            self._run = RunView(gui, self._runs.options.method, changed, self._job.stop)
+            self._run = RunView(gui, self._runs.options.method, changed, self._work.stop)
             self._shares = SharesView(gui)
             self._pixel_view = PixelView(gui, changed)
             with gui.add_folder("Display"):
@@ -109,7 +100,7 @@ class Session:
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
-            self._export = ExportView(gui, self._download)
+            self._export = ExportView(gui, self._work.download)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self._picture, self._thresholds, self._pixel_view)
@@ -120,6 +111,36 @@ class Session:
         canvas.on_hover(self._point)
         canvas.on_key(self._press)
         canvas.on_view(self._see)
+
+    # --- what the work does ---
+
+    def _desk(self) -> Desk:
+        return Desk(
+            read=self._read,
+            move=self._move,
+            busy=self._busy,
+            progress=self._progress,
+            send=self._send,
+            tell=self._tell,
+            refuse=self._refuse,
+            changed=self._wake.set,
+        )
+
+    def _move(self, thresholds: Thresholds) -> None:
+        self._thresholds.set(thresholds)
+
+    def _busy(self, running: bool) -> None:
+        self._run.busy(running)
+
+    def _progress(self, stage: str, fraction: float) -> None:
+        self._run.progress(stage, fraction)
+
+    def _send(self, name: str, data: bytes) -> None:
+        # viser's page itself tells the name and the size
+        self._client.send_file_download(name, data, save_immediately=True)
+
+    def _refuse(self) -> None:
+        self._notify("Still running", "wait until it ends, or cancel it, and try again", "gray")
 
     # --- what the user does ---
 
@@ -138,10 +159,10 @@ class Session:
             "{": partial(self._thresholds.nudge, Ts=-1),
             "}": partial(self._thresholds.nudge, Ts=1),
             "m": self._run.turn,
-            "r": self._linearize_again,
-            "s": self._suggest,
-            "e": lambda: self._download(*self._export.chosen()),
-            "escape": self._job.stop,
+            "r": self._work.linearize,
+            "s": self._work.suggest,
+            "e": lambda: self._work.download(*self._export.chosen()),
+            "escape": self._work.stop,
         }
 
     def _press(self, key: str) -> None:
@@ -164,70 +185,9 @@ class Session:
         self._window = window
         self._wake.set()
 
-    def _suggest(self) -> None:
-        self._begin(self._set_suggested)
-
-    def _linearize_again(self) -> None:
-        state = self._read()
-        self._begin(partial(self._linearize, state.method, state.thresholds))
-
-    def _download(self, kind: str, everything: bool) -> None:
-        self._begin(partial(self._send, self._read(), kind, everything))
-
-    def _begin(self, work: Callable[[], None]) -> None:
-        if not self._job.start(work):
-            self._notify("Still running", "wait until it ends, or cancel it, and try again", "gray")
-
-    # --- long work ---
-
-    def _guarded(self, work: Callable[[], None]) -> None:
-        self._run.busy(True)
-        try:
-            work()
-        except Exception as error:
-            self._tell(error)
-        finally:
-            self._run.busy(False)
-
-    def _linearize(self, method: Method, thresholds: Thresholds | None) -> None:
-        """Analyze by `method`; when None, with the thresholds asked for at first."""
-        options = replace(self._runs.options, method=method)
-        if thresholds is not None:
-            options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
-        self._declined = frozenset((*self._declined, method))
-        with cancelling("linearization", "the earlier result is kept" if self._results else EMPTY):
-            result = self._runs.run(options, self._run.progress, self._job.stopping)
-        self._declined = frozenset(m for m in self._declined if m != method)
-        untouched = not self._results and self._read().thresholds == self._first
-        self._deliver(method, result)
-        if untouched:
-            self._thresholds.set(result.thresholds)
-
-    def _deliver(self, method: Method, result: Analysis) -> None:
-        self._results = {**self._results, method: result}
-
-    def _set_suggested(self) -> None:
-        with cancelling("suggestion", "T and Ts are kept"):
-            suggested = self._runs.suggest(self._run.progress, self._job.stopping)
-        self._thresholds.set(suggested)
-
-    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
-        analysis = self._results.get(state.method)
-        if analysis is None:
-            raise OptionError("there is no result to export yet; linearize first")
-        if is_behind(state, analysis):
-            # what is on screen is a preview: files are of the whole, as a run would give them
-            self._linearize(state.method, state.thresholds)
-            analysis = self._results[state.method]
-        self._run.progress("writing files", 0.5)
-        shown = relabel(self._stack, analysis, state.thresholds)
-        name, data = make_download(shown, kind, None if everything else state.image, self._pack)
-        # viser's page itself tells the name and the size
-        self._client.send_file_download(name, data, save_immediately=True)
-
     # --- drawing ---
 
-    def _work(self) -> None:
+    def _draw(self) -> None:
         rough = False
         while not self._closed.is_set():
             self._wake.wait(max(self._changed + REST - monotonic(), 0.01) if rough else None)
@@ -249,11 +209,11 @@ class Session:
 
     def _round(self) -> bool:
         """Read all widgets and draw what differs; true when something better is to come."""
-        state, results, frame = self._read(), self._results, self._frame
+        state, results, frame = self._read(), self._work.results, self._frame
         if frame is None or state != frame.state:
             self._changed = monotonic()
         rested = monotonic() - self._changed >= REST
-        self._ensure_results(state, results)
+        self._work.ensure(state)
         preview = self._follow(state, results)
         known = frame is not None and state == frame.state and results is self._shown_results
         if frame is None or not known or preview is not frame.preview:
@@ -279,13 +239,6 @@ class Session:
 
         return self._live.follow(state, near, self._window, overtaken)
 
-    def _ensure_results(self, state: ViewState, results: dict[Method, Analysis]) -> None:
-        """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
-        thresholds = state.thresholds if results else None
-        for method in (state.method, state.beside):
-            if method is not None and method not in (*results, *self._declined):
-                self._job.start(partial(self._linearize, method, thresholds))
-
     # --- telling ---
 
     def _notify(self, title: str, body: str, color: Literal["red", "gray"]) -> None:
@@ -307,12 +260,3 @@ class Session:
             return
         traceback.print_exception(error)
         self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")
-
-
-@contextmanager
-def cancelling(what: str, then: str) -> Iterator[None]:
-    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
-    try:
-        yield
-    except Cancelled as error:
-        raise Cancelled(f"{what} cancelled; {then}") from error

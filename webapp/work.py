@@ -1,0 +1,151 @@
+"""The long work of one tab: linearizing, suggesting thresholds, packing files; one at a time."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+
+from photolin.analysis import Analysis, Method
+from photolin.errors import Cancelled, OptionError
+from photolin.factors import Thresholds
+
+from .downloads import Pack, make_download, relabel
+from .job import Job
+from .live import is_behind
+from .runs import Runs
+from .state import ViewState
+
+EMPTY = "linearize again starts anew"
+"""What follows from cancelling the first run."""
+
+
+@dataclass(frozen=True)
+class Desk:
+    """What work needs of its tab; all may be called from any thread."""
+
+    read: Callable[[], ViewState]
+    """The state that all widgets together stand for."""
+    move: Callable[[Thresholds], None]
+    """Move the sliders."""
+    busy: Callable[[bool], None]
+    """Show or hide the progress bar."""
+    progress: Callable[[str, float], None]
+    """Show the stage, and the fraction of it that is done."""
+    send: Callable[[str, bytes], None]
+    """Hand a file of that name to the browser."""
+    tell: Callable[[Exception], None]
+    """Say what went wrong."""
+    refuse: Callable[[], None]
+    """Say that something is running still."""
+    changed: Callable[[], None]
+    """Something is to be drawn anew."""
+
+
+class Work:
+    """The results of a tab, and what makes them."""
+
+    def __init__(self, runs: Runs, pack: Pack, first: Thresholds, desk: Desk) -> None:
+        """Begin with the result of `runs`, if it has one.
+
+        Args:
+            first: where the sliders stand as long as nobody has moved them.
+        """
+        self._runs, self._pack, self._first, self._desk = runs, pack, first, desk
+        self._results: dict[Method, Analysis] = {}
+        if runs.result is not None:
+            self._results[runs.result.options.method] = runs.result
+        self._declined: frozenset[Method] = frozenset()
+        """Methods that were cancelled or failed; not tried again unasked."""
+        self._job = Job(self._guarded, desk.changed)
+
+    @property
+    def results(self) -> dict[Method, Analysis]:
+        """The latest result by each method; a new dictionary whenever one changes."""
+        return self._results
+
+    def deliver(self, method: Method, result: Analysis) -> None:
+        """Take a result that was made elsewhere."""
+        self._results = {**self._results, method: result}
+
+    def stop(self) -> None:
+        """Ask what is running to stop."""
+        self._job.stop()
+
+    def close(self) -> None:
+        """Stop, and start nothing any more."""
+        self._job.close()
+
+    def suggest(self) -> None:
+        """Set T and Ts to what the data suggest."""
+        self._begin(self._suggest)
+
+    def linearize(self) -> None:
+        """Linearize again with T and Ts as the sliders stand."""
+        state = self._desk.read()
+        self._begin(partial(self._linearize, state.method, state.thresholds))
+
+    def download(self, kind: str, everything: bool) -> None:
+        """Send files of what is on screen, see `downloads.make_download`."""
+        self._begin(partial(self._send, self._desk.read(), kind, everything))
+
+    def ensure(self, state: ViewState) -> None:
+        """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
+        thresholds = state.thresholds if self._results else None
+        for method in (state.method, state.beside):
+            if method is not None and method not in (*self._results, *self._declined):
+                self._job.start(partial(self._linearize, method, thresholds))
+
+    def _begin(self, work: Callable[[], None]) -> None:
+        if not self._job.start(work):
+            self._desk.refuse()
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        self._desk.busy(True)
+        try:
+            work()
+        except Exception as error:
+            self._desk.tell(error)
+        finally:
+            self._desk.busy(False)
+
+    def _linearize(self, method: Method, thresholds: Thresholds | None) -> None:
+        """Analyze by `method`; when None, with the thresholds asked for at first."""
+        options = replace(self._runs.options, method=method)
+        if thresholds is not None:
+            options = replace(options, T=thresholds.T, Ts=thresholds.Ts)
+        self._declined = frozenset((*self._declined, method))
+        with cancelling("linearization", "the earlier result is kept" if self._results else EMPTY):
+            result = self._runs.run(options, self._desk.progress, self._job.stopping)
+        self._declined = frozenset(m for m in self._declined if m != method)
+        untouched = not self._results and self._desk.read().thresholds == self._first
+        self.deliver(method, result)
+        if untouched:
+            self._desk.move(result.thresholds)
+
+    def _suggest(self) -> None:
+        with cancelling("suggestion", "T and Ts are kept"):
+            suggested = self._runs.suggest(self._desk.progress, self._job.stopping)
+        self._desk.move(suggested)
+
+    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
+        analysis = self._results.get(state.method)
+        if analysis is None:
+            raise OptionError("there is no result to export yet; linearize first")
+        if is_behind(state, analysis):
+            # what is on screen is a preview: files are of the whole, as a run would give them
+            self._linearize(state.method, state.thresholds)
+            analysis = self._results[state.method]
+        self._desk.progress("writing files", 0.5)
+        shown = relabel(self._runs.stack, analysis, state.thresholds)
+        self._desk.send(
+            *make_download(shown, kind, None if everything else state.image, self._pack)
+        )
+
+
+@contextmanager
+def cancelling(what: str, then: str) -> Iterator[None]:
+    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
+    try:
+        yield
+    except Cancelled as error:
+        raise Cancelled(f"{what} cancelled; {then}") from error
