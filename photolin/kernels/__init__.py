@@ -23,9 +23,10 @@ from .consensus import consensus_rows  # noqa: E402
 from .evidence import evidence_rows  # noqa: E402
 from .fine import fine_band  # noqa: E402
 from .labels import label_rows  # noqa: E402
-from .neighbours import settle_rows, trust_rows  # noqa: E402
+from .neighbours import settle_rows  # noqa: E402
 from .pooled import clear_tile, pooled_tile  # noqa: E402
 from .samples import centre_rows, support_rows  # noqa: E402
+from .trust import trust_rows  # noqa: E402
 
 __all__ = [
     "centre_rows",
