@@ -1,0 +1,96 @@
+"""Derivatives of the linearized bases where the surface is smooth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
+
+from ..errors import DegenerateError
+from .directions import Floats, spread_evenly
+
+SMOOTH = 1.5
+"""Standard deviation of the smoothing before differences are taken, pixels."""
+STEEP, USUAL = 4.0, 0.8
+"""A neighbour is beyond an edge when the direction turns by more than STEEP times what the share
+USUAL of all neighbours turns at most."""
+COVERED = 0.8
+"""Share of the smoothing's weight that must lie on the same side of all edges."""
+MIN_PIXELS = 100
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives:
+    """N pixels away from outlines and edges. Space is x right, y up; read-only."""
+
+    whitening: Floats
+    """(3,3) W: vectors W b spread evenly in direction, whatever lights the bases have."""
+    values: Floats
+    """(N,3) W b, smoothed."""
+    by_x: Floats
+    """(N,3) its derivative to the right, per pixel."""
+    by_y: Floats
+    """(N,3) its derivative upwards, per pixel."""
+    used: NDArray[np.bool_]
+    """(H,W) which pixels they are, in raster order."""
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.setflags(write=False)
+
+
+def differentiate(bases: NDArray[np.floating], known: NDArray[np.bool_]) -> Derivatives:
+    """Smoothed central differences, away from where normals jump.
+
+    Across a depth edge differences are no derivatives, and they are the largest of all; hence
+    smoothing stops there, too.
+
+    Args:
+        bases: (3,H,W) linearized bases.
+        known: (H,W) pixels where they are finite and not zero.
+
+    Raises:
+        DegenerateError: fewer than MIN_PIXELS smooth pixels, or one direction is missing in them.
+    """
+    if known.sum() < MIN_PIXELS:
+        raise DegenerateError(
+            f"{known.sum()} pixels have linearized bases; integrability needs at least {MIN_PIXELS}"
+        )
+    values = bases[:, known].T.astype(float)
+    whitening = spread_evenly(values / np.linalg.norm(values, axis=1, keepdims=True))
+    field = np.zeros(bases.shape)
+    field[:, known] = whitening @ values.T
+    smooth = known & ~binary_dilation(find_edges(field, known), np.ones((3, 3)))
+    field, share = blur(field, smooth, SMOOTH)
+    used = binary_erosion(smooth & (share > COVERED), np.ones((3, 3)))
+    if used.sum() < MIN_PIXELS:
+        raise DegenerateError(
+            f"{used.sum()} pixels lie away from outlines and edges; integrability needs at least "
+            f"{MIN_PIXELS} of a smooth surface: larger images are accepted"
+        )
+    by_x, by_y = np.gradient(field, axis=2), -np.gradient(field, axis=1)
+    return Derivatives(whitening, field[:, used].T, by_x[:, used].T, by_y[:, used].T, used)
+
+
+def find_edges(field: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H,W) pixels on either side of a jump of the direction of `field` (3,H,W)."""
+    calm, _ = blur(field, known, 1.0)
+    unit = calm / np.maximum(np.linalg.norm(calm, axis=0), np.finfo(float).tiny)
+    edges = np.zeros(known.shape, bool)
+    pairs = [(np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:, :], np.s_[:-1, :])]
+    turns = [
+        np.linalg.norm(unit[:, *a] - unit[:, *b], axis=0) * (known[a] & known[b]) for a, b in pairs
+    ]
+    both = [turn[known[a] & known[b]] for turn, (a, b) in zip(turns, pairs, strict=True)]
+    limit = STEEP * np.quantile(np.concatenate([*both, [0.0]]), USUAL)
+    for turn, (a, b) in zip(turns, pairs, strict=True):
+        edges[a] |= turn > limit
+        edges[b] |= turn > limit
+    return edges
+
+
+def blur(field: Floats, where: NDArray[np.bool_], sigma: float) -> tuple[Floats, Floats]:
+    """Gaussian mean of `field` (3,H,W) over the pixels `where`, and the share of weight there."""
+    share = gaussian_filter(where.astype(float), sigma)
+    total = np.stack([gaussian_filter(np.where(where, plane, 0.0), sigma) for plane in field])
+    return total / np.maximum(share, np.finfo(float).tiny), share
