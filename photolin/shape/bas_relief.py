@@ -50,7 +50,7 @@ def choose_relief(
     """
     start = face_camera(vectors, weights)
     step = -(-len(vectors) // PIXELS)
-    even = centred = vectors[::step] @ start.T
+    centred = vectors[::step] @ start.T
     share = weights[::step] / weights[::step].sum()
     rays = None if lights is None else lights @ np.linalg.inv(start)
 
@@ -122,8 +122,10 @@ def weighted_median(values: Floats, weights: Floats) -> float:
 def points_inward(vectors: Floats, used: NDArray[np.bool_], mask: NDArray[np.bool_]) -> bool:
     """Whether normals near the outline point into the object; else whether it is concave."""
     unit = normalize(vectors)
-    edge = distance_transform_edt(np.pad(mask, RIM, mode="edge"))[RIM:-RIM, RIM:-RIM]
-    down, right = np.gradient(gaussian_filter(edge, 1.5))
+    # the picture's own border is no outline
+    edge = np.asarray(distance_transform_edt(mask))
+    calm = gaussian_filter(edge, 1.5)
+    down, right = np.gradient(calm, axis=0), np.gradient(calm, axis=1)
     near = (edge <= RIM)[used] if not mask.all() else np.zeros(len(unit), bool)
     out = -(unit[near, 0] * right[used][near] - unit[near, 1] * down[used][near])
     if near.any() and abs(out.mean()) > 0.1:

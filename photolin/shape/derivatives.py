@@ -7,13 +7,16 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 
 from ..errors import DegenerateError
-from .directions import Floats, spread_evenly
+from .directions import SINGULAR, Floats, normalize, spread_evenly
 
 SMOOTH = 1.5
 """Standard deviation of the smoothing before differences are taken, pixels."""
 STEEP, USUAL = 4.0, 0.8
 """A neighbour is beyond an edge when the direction turns by more than STEEP times what the share
 USUAL of all neighbours turns at most."""
+NOISE = 0.3
+"""Least spread of the smoothed directions in each dimension, 0.58 where they spread evenly: noise
+alone, which whitening lifts as high, is smoothed to 0.11."""
 COVERED = 0.8
 """Share of the smoothing's weight that must lie on the same side of all edges."""
 MIN_PIXELS = 100
@@ -50,26 +53,35 @@ def differentiate(bases: NDArray[np.floating], known: NDArray[np.bool_]) -> Deri
         known: (H,W) pixels where they are finite and not zero.
 
     Raises:
-        DegenerateError: fewer than MIN_PIXELS smooth pixels, or one direction is missing in them.
+        DegenerateError: fewer than MIN_PIXELS smooth pixels, or directions that do not spread in
+            three dimensions but for noise.
     """
     if known.sum() < MIN_PIXELS:
         raise DegenerateError(
             f"{known.sum()} pixels have linearized bases; integrability needs at least {MIN_PIXELS}"
         )
     values = bases[:, known].T.astype(float)
-    whitening = spread_evenly(values / np.linalg.norm(values, axis=1, keepdims=True))
+    whitening = spread_evenly(normalize(values), SINGULAR)
     field = np.zeros(bases.shape)
     field[:, known] = whitening @ values.T
-    smooth = known & ~binary_dilation(find_edges(field, known), np.ones((3, 3)))
+    smooth = known & ~binary_dilation(find_edges(field, known), np.ones((3, 3))).astype(bool)
     field, share = blur(field, smooth, SMOOTH)
-    used = binary_erosion(smooth & (share > COVERED), np.ones((3, 3)))
+    used = binary_erosion(smooth & (share > COVERED), np.ones((3, 3))).astype(bool)
     if used.sum() < MIN_PIXELS:
         raise DegenerateError(
             f"{used.sum()} pixels lie away from outlines and edges; integrability needs at least "
             f"{MIN_PIXELS} of a smooth surface: larger images are accepted"
         )
+    values = field[:, used].T
+    spread = np.linalg.svd(normalize(values), compute_uv=False)[2] / np.sqrt(len(values))
+    if spread < NOISE:
+        raise DegenerateError(
+            "integrability does not determine the lights: but for noise, the normals lie in a "
+            "plane, as those of flat surfaces and cylinders; accepted are surfaces curved to all "
+            "sides, or other ways to resolve the ambiguity"
+        )
     by_x, by_y = np.gradient(field, axis=2), -np.gradient(field, axis=1)
-    return Derivatives(whitening, field[:, used].T, by_x[:, used].T, by_y[:, used].T, used)
+    return Derivatives(whitening, values, by_x[:, used].T, by_y[:, used].T, used)
 
 
 def find_edges(field: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -9,7 +9,10 @@ from ..errors import DegenerateError
 Floats = NDArray[np.float64]
 
 FLAT = 0.02
-"""Least singular value of unit vectors, divided by the root of their number: nearly in a plane."""
+"""Least singular value of known directions, divided by the root of their number: below it they lie
+nearly in a plane."""
+SINGULAR = 1e-5
+"""The same of given vectors, which the ambiguity may press together: below it, of rounding."""
 GENERAL = 0.01
 """Singular value that tells how well N directions determine the map, relative to the largest."""
 
@@ -29,7 +32,7 @@ def fit_directions(given: Floats, known: Floats) -> Floats:
         DegenerateError: fewer than four of them, no three in a plane, on either side.
     """
     unit = given / np.linalg.norm(given, axis=1, keepdims=True)
-    before, after = spread_evenly(unit), spread_evenly(known)
+    before, after = spread_evenly(unit, SINGULAR), spread_evenly(known, FLAT)
     linear = solve_linear(normalize(unit @ before.T), normalize(known @ after.T))
     matrix = np.linalg.inv(after) @ linear @ before
     if (known * (unit @ matrix.T)).sum() < 0:
@@ -37,14 +40,14 @@ def fit_directions(given: Floats, known: Floats) -> Floats:
     return refine_directions(matrix, given, known)
 
 
-def spread_evenly(vectors: Floats) -> Floats:
+def spread_evenly(vectors: Floats, least: float) -> Floats:
     """(3,3) map after which unit vectors (N,3) have the second moments of evenly spread ones.
 
     Raises:
-        DegenerateError: they lie nearly in one plane.
+        DegenerateError: they lie in one plane but for `least`, the root mean square from it.
     """
     _, s, vt = np.linalg.svd(vectors, full_matrices=False)
-    if len(s) < 3 or s[2] < FLAT * np.sqrt(len(vectors)):
+    if len(s) < 3 or s[2] < least * np.sqrt(len(vectors)):
         raise DegenerateError(
             f"the {len(vectors)} directions lie nearly in one plane and leave the ambiguity open; "
             "directions that spread to all sides are accepted"
@@ -87,7 +90,7 @@ def refine_directions(matrix: Floats, given: Floats, known: Floats, loss: float 
     found = least_squares(
         differences,
         matrix.ravel() / scale,
-        slopes,
+        slopes,  # type: ignore[arg-type]  # scipy's stub knows names only
         x_scale="jac",
         loss="cauchy" if loss else "linear",
         f_scale=np.radians(loss or 1.0),

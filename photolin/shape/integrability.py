@@ -13,10 +13,12 @@ ROUNDS = 30
 """Of reweighting; the weights have settled long before."""
 PULL = 2.0
 """Median residuals from which on a pixel loses weight."""
-UNCLEAR = 0.3
+UNCLEAR = 0.2
 """Largest ratio of the least singular values squared: beyond it another solution fits as well."""
-FLAT = 1e-6
+FLAT = 1e-4
 """Least ratio of the second least to the greatest: below it two solutions fit."""
+DOUBTFUL = 0.1
+"""Residual from which on the note warns."""
 
 
 def resolve_by_integrability(
@@ -72,6 +74,8 @@ def resolve_by_integrability(
         f"{', lights of about equal power' if coefficients is not None else ''} and an outline "
         "that bends away from the camera, so that depth may still be stretched or tilted"
     )
+    if residual > DOUBTFUL:
+        note += "; they agree so badly that the lights may be far off"
     return Resolved(set_scale(matrix @ smooth.whitening), "integrability", residual, False, note)
 
 
@@ -98,11 +102,12 @@ def solve_robustly(system: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     weights = length / np.hypot(length, typical)
     rows = system / np.hypot(length, typical)[:, None]
     trust = np.ones(len(rows))
+    values, vectors = np.linalg.eigh(rows.T @ rows)
     for _ in range(ROUNDS):
-        values, vectors = np.linalg.eigh((rows * trust[:, None]).T @ rows)
         misfit = np.abs(rows @ vectors[:, 0])
         scale = max(weighted_median(misfit, weights**2), 1e-6)
         trust = 1 / (1 + (misfit / (PULL * scale)) ** 2) ** 2
+        values, vectors = np.linalg.eigh((rows * trust[:, None]).T @ rows)
     if values[0] > UNCLEAR * values[1] or values[1] < FLAT * values[5]:
         raise DegenerateError(FLAT_MESSAGE)
     return vectors[:3, 0], vectors[3:, 0], trust, weights

@@ -113,7 +113,7 @@ def read_points(
 
 def find_wrong(given: NDArray[np.float64], known: NDArray[np.float64]) -> int | None:
     """Number of the point that the fit of all others contradicts, if they agree by themselves."""
-    best, errors = None, np.inf
+    best, errors, miss = None, np.inf, 0.0
     for k in range(len(known)):
         others = np.arange(len(known)) != k
         try:
@@ -124,5 +124,5 @@ def find_wrong(given: NDArray[np.float64], known: NDArray[np.float64]) -> int | 
         # two equations a point, eight unknowns
         rms = np.sqrt(np.square(angles[others]).sum() / (len(known) - 1 - MIN_POINTS))
         if rms < errors:
-            best, errors, miss = k, rms, angles[k]
-    return best if best is not None and miss > max(WRONG, CLEARLY * errors) else None
+            best, errors, miss = k, rms, float(angles[k])
+    return best if miss > max(WRONG, CLEARLY * errors) else None

@@ -43,7 +43,7 @@ def resolve_from_lights(
     check_spread(known, "lights")
     check_spread(given, "coefficients")
     if powers:
-        matrix = np.linalg.inv(np.linalg.lstsq(given, known, rcond=None)[0])
+        matrix = np.linalg.inv(np.linalg.pinv(given) @ known).astype(float)
     else:
         # s = A^T c: the same map of directions as normals have
         matrix = set_scale(np.linalg.inv(fit_directions(given, normalize(known)).T))
