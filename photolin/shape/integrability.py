@@ -69,13 +69,13 @@ def resolve_by_integrability(
     matrix = chosen @ matrix
     residual = measure_residual(smooth, matrix, trust)
     note = (
-        "resolved by integrability alone: dp/dy and dq/dx agree to "
-        f"{100 * residual:.1f} % of the slopes' changes; assumed are albedo as even as possible"
+        f"resolved by integrability alone: dp/dy and dq/dx differ by {100 * residual:.1f} % of the "
+        "slopes' changes; assumed are an albedo as even as possible"
         f"{', lights of about equal power' if coefficients is not None else ''} and an outline "
-        "that bends away from the camera, so that depth may still be stretched or tilted"
+        "that bends away from the camera; depth may still be stretched or tilted"
     )
     if residual > DOUBTFUL:
-        note += "; they agree so badly that the lights may be far off"
+        note += "; they differ by so much that the lights are doubtful"
     return Resolved(set_scale(matrix @ smooth.whitening), "integrability", residual, False, note)
 
 

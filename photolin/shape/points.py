@@ -12,8 +12,8 @@ from .resolved import Resolved, set_scale
 MIN_POINTS = 4
 WRONG = 5.0
 """Degrees by which a point must miss the fit of the others to be left out."""
-CLEARLY = 5.0
-"""How many times the error of the others that must be."""
+CHANCE = 0.01
+"""Greatest probability that errors alike in all points would make one stand out as much."""
 
 
 def resolve_from_points(
@@ -26,7 +26,7 @@ def resolve_from_points(
 
     Albedo is unknown and may differ: a point gives two equations for eight unknowns (Mukaigawa et
     al. 2007, section 4.C, with five points). Of six points or more, one that contradicts all
-    others is left out and named in the note.
+    others, more than their own errors explain, is left out and named in the note.
 
     Args:
         bases: (3,H,W) linearized bases, NaN where undetermined, 0 outside the mask.
@@ -112,17 +112,30 @@ def read_points(
 
 
 def find_wrong(given: NDArray[np.float64], known: NDArray[np.float64]) -> int | None:
-    """Number of the point that the fit of all others contradicts, if they agree by themselves."""
-    best, errors, miss = None, np.inf, 0.0
+    """Number of the point without which the others fit so much better that it must be wrong.
+
+    An F test of a point's two equations against the m - 8 spare ones of the others, for the worst
+    of N points (Bonferroni); with two degrees of freedom its probability is a mere power.
+    """
+    squares = fit(given, known, np.ones(len(known), bool))[1]
+    best, least, miss = None, squares, 0.0
     for k in range(len(known)):
         others = np.arange(len(known)) != k
         try:
-            matrix = fit_directions(given[others], known[others])
+            matrix, rest = fit(given, known, others)
         except DegenerateError:
             continue
-        angles = angles_between(given @ matrix.T, known)
-        # two equations a point, eight unknowns
-        rms = np.sqrt(np.square(angles[others]).sum() / (len(known) - 1 - MIN_POINTS))
-        if rms < errors:
-            best, errors, miss = k, rms, float(angles[k])
-    return best if miss > max(WRONG, CLEARLY * errors) else None
+        if rest < least:
+            best, least = k, rest
+            miss = angles_between(given[[k]] @ matrix.T, known[[k]])[0]
+    spare = len(known) - 1 - MIN_POINTS
+    chance = len(known) * (least / max(squares, np.finfo(float).tiny)) ** spare
+    return best if miss > WRONG and chance < CHANCE else None
+
+
+def fit(
+    given: NDArray[np.float64], known: NDArray[np.float64], kept: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], float]:
+    """M for the points that are kept, and the sum of their squared angles."""
+    matrix = fit_directions(given[kept], known[kept])
+    return matrix, float(np.square(angles_between(given[kept] @ matrix.T, known[kept])).sum())

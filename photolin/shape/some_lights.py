@@ -42,12 +42,10 @@ def resolve_from_lights(
     given = np.asarray(coefficients, float)[numbers]
     check_spread(known, "lights")
     check_spread(given, "coefficients")
-    if powers:
-        matrix = np.linalg.inv(np.linalg.pinv(given) @ known).astype(float)
-    else:
-        # s = A^T c: the same map of directions as normals have
-        matrix = set_scale(np.linalg.inv(fit_directions(given, normalize(known)).T))
-    angles = angles_between(given @ np.linalg.inv(matrix), known)
+    # s = A^T c, A = M^-1: where only directions count, the same fit as that of normals
+    inverse = np.linalg.pinv(given) @ known if powers else fit_directions(given, normalize(known)).T
+    matrix = np.linalg.inv(inverse).astype(float)
+    angles = angles_between((given @ inverse).astype(float), known)
     residual, worst = float(np.sqrt(np.square(angles).mean())), int(angles.argmax())
     kind: Kind = "lights" if len(numbers) == len(coefficients) else "some lights"
     note = (
@@ -57,7 +55,7 @@ def resolve_from_lights(
     )
     if len(numbers) == (3 if powers else 4):
         note += "; so few are fitted exactly, one more would check them"
-    return Resolved(matrix, kind, residual, powers, note, angles)
+    return Resolved(matrix if powers else set_scale(matrix), kind, residual, powers, note, angles)
 
 
 def check(
