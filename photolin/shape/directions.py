@@ -68,12 +68,8 @@ def solve_linear(given: Floats, known: Floats) -> Floats:
     return vt[8].reshape(3, 3)
 
 
-def refine_directions(matrix: Floats, given: Floats, known: Floats, loss: float = 0.0) -> Floats:
-    """The M near `matrix` with the least sum of squared angles.
-
-    Args:
-        loss: angle, degrees, from which on a vector loses weight (Cauchy); 0: none does.
-    """
+def refine_directions(matrix: Floats, given: Floats, known: Floats) -> Floats:
+    """The M near `matrix` with the least sum of squared angles."""
     scale = np.linalg.norm(matrix)
 
     def differences(x: Floats) -> Floats:
@@ -87,14 +83,7 @@ def refine_directions(matrix: Floats, given: Floats, known: Floats, loss: float 
         return (across[..., None] * given[:, None, None, :]).reshape(-1, 9)
 
     # the length of M is free: it is taken from where it started
-    found = least_squares(
-        differences,
-        matrix.ravel() / scale,
-        slopes,  # type: ignore[arg-type]  # scipy's stub knows names only
-        x_scale="jac",
-        loss="cauchy" if loss else "linear",
-        f_scale=np.radians(loss or 1.0),
-    ).x
+    found = least_squares(differences, matrix.ravel() / scale, slopes, x_scale="jac").x  # type: ignore[arg-type]
     return found.reshape(3, 3) * scale / np.linalg.norm(found)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DegenerateError, InputError
-from .directions import FLAT, angles_between, fit_directions, normalize
+from .directions import FLAT, SINGULAR, angles_between, fit_directions, normalize
 from .resolved import Kind, Resolved, set_scale
 
 
@@ -40,8 +40,9 @@ def resolve_from_lights(
     numbers, known = np.asarray(images), np.asarray(lights, float)
     check(numbers, known, len(coefficients), 3 if powers else 4)
     given = np.asarray(coefficients, float)[numbers]
-    check_spread(known, "lights")
-    check_spread(given, "coefficients")
+    check_spread(known, FLAT, "lights")
+    # the ambiguity may press these together
+    check_spread(given, SINGULAR, "coefficients")
     # s = A^T c, A = M^-1: where only directions count, the same fit as that of normals
     inverse = np.linalg.pinv(given) @ known if powers else fit_directions(given, normalize(known)).T
     matrix = np.linalg.inv(inverse).astype(float)
@@ -86,10 +87,10 @@ def check(
         )
 
 
-def check_spread(vectors: NDArray[np.float64], what: str) -> None:
+def check_spread(vectors: NDArray[np.float64], least: float, what: str) -> None:
     """Raise DegenerateError when `vectors` (N,3) lie nearly in a plane."""
     spread = np.linalg.svd(normalize(vectors), compute_uv=False)[2]
-    if spread < FLAT * np.sqrt(len(vectors)):
+    if spread < least * np.sqrt(len(vectors)):
         raise DegenerateError(
             f"the {what} of the {len(vectors)} images of known light lie nearly in one plane; "
             "images lit from three sides or more are accepted"

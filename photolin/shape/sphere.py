@@ -20,8 +20,12 @@ PIXELS = 3000
 """Most pixels of the sphere that are used, spread evenly."""
 DRAWS = 300
 """Random fours of pixels: one of all good pixels is among them if a third of all are good."""
-TOLERANCE = 3.0
-"""Degrees off the sphere's normal from which on a pixel loses weight."""
+TOLERANCE = 6.0
+"""Degrees off the sphere's normal up to which a pixel agrees with a fit to four."""
+AGREEING = 0.2
+"""Least share of the pixels that must, for a sphere to be seen."""
+TRIM, ROUNDS = 4.0, 10
+"""Pixels off by more than TRIM times the median are left out of the fit, in each of ROUNDS."""
 
 
 def sphere_normals(
@@ -60,8 +64,8 @@ def resolve_from_sphere(
 ) -> Resolved:
     """The matrix M with M b along the sphere's normal, whatever its albedo.
 
-    Least squares of the angles over the pixels within RIM of the outline, with a loss (Cauchy)
-    that what stands before the sphere cannot pull, from the best of many exact fits to four pixels.
+    From the best of many exact fits to four pixels, least squares of the angles over the pixels
+    within RIM of the outline, without those that are far off: what stands before the sphere.
 
     Args:
         bases: (3,H,W) linearized bases, NaN where undetermined, 0 outside the mask.
@@ -93,14 +97,26 @@ def resolve_from_sphere(
         )
     step = -(-count // PIXELS)
     given, known = bases[:, used].T[::step].astype(float), normals[used][::step]
-    matrix = refine_directions(find_start(given, known), given, known, TOLERANCE)
+    matrix = trim(find_start(given, known), given, known)
     angles = angles_between(bases[:, used].T @ matrix.T, normals[used])
     note = (
         f"resolved by a sphere at row {centre[0]:g}, column {centre[1]:g}, radius {radius:g} "
         f"pixels: half of its {count} pixels fit within {np.median(angles):.2f} degrees, "
-        f"{100 * (angles > 3 * TOLERANCE).mean():.0f} % are off by more than {3 * TOLERANCE:g}"
+        f"{100 * (angles > TOLERANCE).mean():.0f} % are off by more than {TOLERANCE:g}"
     )
     return Resolved(set_scale(matrix), "sphere", float(np.median(angles)), False, note)
+
+
+def trim(matrix: Floats, given: Floats, known: Floats) -> Floats:
+    """M fitted again and again to the pixels that it fits."""
+    kept = np.zeros(len(given), bool)
+    for _ in range(ROUNDS):
+        angles = angles_between(given @ matrix.T, known)
+        before, kept = kept, angles <= TRIM * np.median(angles)
+        if (kept == before).all():
+            break
+        matrix = refine_directions(matrix, given[kept], known[kept])
+    return matrix
 
 
 def find_start(given: Floats, known: Floats) -> Floats:
@@ -113,15 +129,15 @@ def find_start(given: Floats, known: Floats) -> Floats:
     # both fourths in terms of the first three: M = K diag(those of k / those of g) G^-1
     ratio = np.linalg.solve(k[..., :3], k[..., 3:]) / np.linalg.solve(g[..., :3], g[..., 3:])
     matrices = (k[..., :3] * ratio.swapaxes(1, 2)) @ np.linalg.inv(g[..., :3])
-    best, most = np.zeros(len(given), bool), 0.0
+    best, most = np.zeros(len(given), bool), 0
     for matrix in matrices:
         mapped = normalize(unit @ matrix.T)
         cosine = (mapped * known).sum(axis=1)
         cosine = cosine if cosine.sum() > 0 else -cosine
-        agrees = cosine > np.cos(np.radians(2 * TOLERANCE))
+        agrees = cosine > np.cos(np.radians(TOLERANCE))
         if agrees.sum() > most:
             best, most = agrees, agrees.sum()
-    if most < MIN_PIXELS / 2:
+    if most < AGREEING * len(given):
         raise DegenerateError(
             "the linearized values inside the outline are not those of a sphere; accepted is a "
             "matte sphere, with the row, column and radius of its outline"
