@@ -33,11 +33,11 @@ def fit_directions(given: Floats, known: Floats) -> Floats:
     """
     unit = given / np.linalg.norm(given, axis=1, keepdims=True)
     before, after = spread_evenly(unit, SINGULAR), spread_evenly(known, FLAT)
-    linear = solve_linear(normalize(unit @ before.T), normalize(known @ after.T))
-    matrix = np.linalg.inv(after) @ linear @ before
-    if (known * (unit @ matrix.T)).sum() < 0:
+    even = normalize(unit @ before.T)
+    matrix = np.linalg.inv(after) @ solve_linear(even, normalize(known @ after.T))
+    if (known * (even @ matrix.T)).sum() < 0:
         matrix = -matrix
-    return refine_directions(matrix, given, known)
+    return refine_directions(matrix, even, known) @ before
 
 
 def spread_evenly(vectors: Floats, least: float) -> Floats:
@@ -83,7 +83,7 @@ def refine_directions(matrix: Floats, given: Floats, known: Floats) -> Floats:
         return (across[..., None] * given[:, None, None, :]).reshape(-1, 9)
 
     # the length of M is free: it is taken from where it started
-    found = least_squares(differences, matrix.ravel() / scale, slopes, x_scale="jac").x  # type: ignore[arg-type]
+    found = least_squares(differences, matrix.ravel() / scale, slopes, method="lm").x  # type: ignore[arg-type]
     return found.reshape(3, 3) * scale / np.linalg.norm(found)
 
 

@@ -9,7 +9,6 @@ from .directions import (
     angles_between,
     fit_directions,
     normalize,
-    refine_directions,
 )
 from .resolved import Resolved, set_scale
 
@@ -26,6 +25,8 @@ AGREEING = 0.2
 """Least share of the pixels that must, for a sphere to be seen."""
 TRIM, ROUNDS = 4.0, 10
 """Pixels off by more than TRIM times the median are left out of the fit, in each of ROUNDS."""
+EXACT = 0.05
+"""Degrees; the least median that is told from rounding."""
 
 
 def sphere_normals(
@@ -112,10 +113,10 @@ def trim(matrix: Floats, given: Floats, known: Floats) -> Floats:
     kept = np.zeros(len(given), bool)
     for _ in range(ROUNDS):
         angles = angles_between(given @ matrix.T, known)
-        before, kept = kept, angles <= TRIM * np.median(angles)
+        before, kept = kept, angles <= TRIM * max(np.median(angles), EXACT)
         if (kept == before).all():
             break
-        matrix = refine_directions(matrix, given[kept], known[kept])
+        matrix = fit_directions(given[kept], known[kept])
     return matrix
 
 
