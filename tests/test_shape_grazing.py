@@ -160,7 +160,7 @@ def test_brightness_scales_the_bases(uneven: tuple[ImageStack, Analysis, np.ndar
         linearized_bases=a.linearized_bases / 2,
         thresholds=replace(a.thresholds, Ts=a.thresholds.Ts / 2),
     )
-    dim = ImageStack(stack.images / 2, stack.mask, stack.names, lights=stack.lights)
+    dim = ImageStack(stack.images / np.float32(2), stack.mask, stack.names, lights=stack.lights)
     np.testing.assert_allclose(2 * fit_grazing(dim, half), fit_grazing(stack, a), atol=1e-6)
 
 
