@@ -14,6 +14,8 @@ SMOOTH = 1.5
 STEEP, USUAL = 4.0, 0.8
 """A neighbour is beyond an edge when the direction turns by more than STEEP times what the share
 USUAL of all neighbours turns at most."""
+DARK = 0.1
+"""Share of the median albedo below which a pixel has less weight in the smoothing."""
 NOISE = 0.3
 """Least spread of the smoothed directions in each dimension, 0.58 where they spread evenly: noise
 alone, which whitening lifts as high, is smoothed to 0.11."""
@@ -27,9 +29,9 @@ class Derivatives:
     """N pixels away from outlines and edges. Space is x right, y up; read-only."""
 
     whitening: Floats
-    """(3,3) W: vectors W b spread evenly in direction, whatever lights the bases have."""
+    """(3,3) W: W b spread evenly in direction, whatever lights the bases have."""
     values: Floats
-    """(N,3) W b, smoothed."""
+    """(N,3) W b divided by albedo and smoothed."""
     by_x: Floats
     """(N,3) its derivative to the right, per pixel."""
     by_y: Floats
@@ -63,7 +65,7 @@ def differentiate(bases: NDArray[np.floating], known: NDArray[np.bool_]) -> Deri
     values = bases[:, known].T.astype(float)
     whitening = spread_evenly(normalize(values), SINGULAR)
     field = np.zeros(bases.shape)
-    field[:, known] = whitening @ values.T
+    field[:, known] = divide_albedo(values @ whitening.T).T
     smooth = known & ~binary_dilation(find_edges(field, known), np.ones((3, 3))).astype(bool)
     field, share = blur(field, smooth, SMOOTH)
     used = binary_erosion(smooth & (share > COVERED), np.ones((3, 3))).astype(bool)
@@ -82,6 +84,15 @@ def differentiate(bases: NDArray[np.floating], known: NDArray[np.bool_]) -> Deri
         )
     by_x, by_y = np.gradient(field, axis=2), -np.gradient(field, axis=1)
     return Derivatives(whitening, values, by_x[:, used].T, by_y[:, used].T, used)
+
+
+def divide_albedo(vectors: Floats) -> Floats:
+    """Unit vectors (N,3); shorter ones of the very dark, whose direction is noise.
+
+    A mean across two paints would else stand for places that lie more in the brighter one.
+    """
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.maximum(lengths, DARK * np.median(lengths))
 
 
 def find_edges(field: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:

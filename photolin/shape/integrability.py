@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..errors import DegenerateError, InputError
 from .bas_relief import choose_relief, weighted_median
@@ -21,6 +22,8 @@ DOUBTFUL = 0.1
 """Residual from which on the note warns."""
 
 
+# a sum's last digits depend on how many threads of BLAS share it
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def resolve_by_integrability(
     bases: NDArray[np.floating],
     mask: NDArray[np.bool_],
@@ -62,12 +65,11 @@ def resolve_by_integrability(
     matrix = np.linalg.inv(np.stack([v, -u, third / np.linalg.norm(third)], axis=1))
     if np.median(smooth.values @ matrix[2]) < 0:
         matrix = np.diag([1.0, 1.0, -1.0]) @ matrix
-    lights = None
-    if coefficients is not None:
-        lights = coefficients @ np.linalg.inv(matrix @ smooth.whitening)
-    chosen = choose_relief(smooth.values @ matrix.T, weights, lights, smooth.used, known)
-    matrix = chosen @ matrix
-    residual = measure_residual(smooth, matrix, trust)
+    matrix = matrix @ smooth.whitening
+    lights = None if coefficients is None else coefficients @ np.linalg.inv(matrix)
+    vectors = bases[:, smooth.used].T @ matrix.T
+    matrix = choose_relief(vectors, weights, lights, smooth.used, known) @ matrix
+    residual = measure_residual(smooth, matrix @ np.linalg.inv(smooth.whitening), trust)
     note = (
         f"resolved by integrability alone: dp/dy and dq/dx differ by {100 * residual:.1f} % of the "
         "slopes' changes; assumed are an albedo as even as possible"
@@ -76,7 +78,7 @@ def resolve_by_integrability(
     )
     if residual > DOUBTFUL:
         note += "; they differ by so much that the lights are doubtful"
-    return Resolved(set_scale(matrix @ smooth.whitening), "integrability", residual, False, note)
+    return Resolved(set_scale(matrix), "integrability", residual, False, note)
 
 
 def conditions(smooth: Derivatives) -> Floats:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..errors import DegenerateError, InputError
 from .directions import (
@@ -57,6 +58,8 @@ def sphere_normals(
     return np.stack([x, y, z], axis=-1) * inside[..., None], inside
 
 
+# a sum's last digits depend on how many threads of BLAS share it
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def resolve_from_sphere(
     bases: NDArray[np.floating],
     mask: NDArray[np.bool_],
