@@ -48,8 +48,10 @@ def errors(found: BallLights, lights: np.ndarray) -> np.ndarray:
     return angles_between(found.directions, lights)
 
 
-def test_lights_are_found_within_half_a_degree() -> None:
-    found = estimate_lights(*mirror(sky()))
+@pytest.mark.parametrize("size", [1.3, 3.0])
+def test_lights_are_found_within_half_a_degree(size: float) -> None:
+    """Of spots a pixel wide, too, whose partly covered pixels decide."""
+    found = estimate_lights(*mirror(sky(), size))
     assert errors(found, sky()).max() < 0.5
     assert found.directions.shape == (8, 3)
     np.testing.assert_allclose(np.linalg.norm(found.directions, axis=1), 1)
@@ -148,6 +150,7 @@ def test_a_mask_a_little_too_large_or_ragged_is_accepted() -> None:
     images, mask = mirror(sky())
     ragged = mask.copy()
     ragged[:, ::5] &= np.roll(mask, 2, 0)[:, ::5]
+    images[:, mask & ~ragged] = 1
     assert errors(estimate_lights(images, ragged), sky()).max() < 1.5
 
 
@@ -155,6 +158,16 @@ def test_a_ball_that_mirrors_nothing_is_refused() -> None:
     images, mask = mirror(sky())
     with pytest.raises(InputError, match="none of 8 images shows a bright spot on the ball at row"):
         estimate_lights(images * 0.1, mask)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_images_that_are_not_finite_on_the_ball_are_refused(value: float) -> None:
+    images, mask = mirror(sky()[:3])
+    images[:, 0, 0] = value
+    estimate_lights(images, mask)
+    images[1, 70, 80] = value
+    with pytest.raises(InputError, match="image 1 of the ball holds NaN or infinity"):
+        estimate_lights(images, mask)
 
 
 def test_it_is_read_only() -> None:

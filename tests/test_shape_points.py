@@ -95,6 +95,7 @@ def test_one_wrong_click_of_six_or_more_is_left_out_and_named() -> None:
         assert resolved.residuals is not None
         assert resolved.residuals.argmax() == 2
         assert resolved.residuals[2] > 5
+        assert f"worst {np.delete(resolved.residuals, 2).max():.2f} degrees at" in resolved.note
         assert resolved.residual < 0.5
         assert light_errors(resolved).max() < 1.5
         assert f"resolved by {count - 1} points" in resolved.note
@@ -106,6 +107,15 @@ def test_of_five_none_is_left_out_but_the_residual_tells() -> None:
     resolved = resolve_from_points(bases, rows, columns, normals)
     assert "left out" not in resolved.note
     assert resolved.residual > 10 * resolve_from_points(*clicked(5)).residual
+
+
+def test_a_click_that_is_little_off_is_kept_even_among_exact_ones() -> None:
+    truth = scene()[0].truth
+    _, rows, columns, normals = clicked(8)
+    normals[2] = normalize(normals[2:3] + np.array([0.05, 0, 0]))[0]
+    resolved = resolve_from_points(truth.normals.transpose(2, 0, 1), rows, columns, normals)
+    assert "left out" not in resolved.note
+    assert resolved.residual > 0.3
 
 
 def test_inaccurate_normals_are_all_kept() -> None:
@@ -124,6 +134,8 @@ def test_inaccurate_normals_are_all_kept() -> None:
         (lambda b, r, c, n: (b, r[:3], c[:3], n[:3]), "3 points of known normal; at least 4"),
         (lambda b, r, c, n: (b, r, c[:4], n), r"shapes \(5,\), \(4,\) and \(5, 3\)"),
         (lambda b, r, c, n: (b, r, c, n[:, :2]), r"\(N,\), \(N,\) and \(N,3\) are accepted"),
+        (lambda b, r, c, n: (b, r + 0.5, c, n), "are not whole; pixels are accepted"),
+        (lambda b, r, c, n: (b, [], [], n[:0]), "0 points of known normal; at least 4"),
         (lambda b, r, c, n: (b, r + 100, c, n), "row 120, column 80 is outside the image of 120"),
         (lambda b, r, c, n: (b, r, c - 90, n), "column -10 is outside"),
         (lambda b, r, c, n: (b * np.nan, r, c, n), "row 20, column 80 has no linearized bases"),

@@ -42,6 +42,17 @@ def test_directions_alone_give_all_directions_and_relative_powers(images) -> Non
     assert not resolved.scaled
 
 
+def test_where_only_directions_count_lengths_do_not() -> None:
+    coefficients, lights = known()
+    rng = np.random.default_rng(0)
+    noisy = lights + rng.normal(0, 0.03, lights.shape)
+    first, other = (
+        resolve_from_lights(coefficients, range(10), noisy * lengths, powers=False).matrix
+        for lengths in (1, rng.uniform(0.1, 9, (10, 1)))
+    )
+    np.testing.assert_allclose(other, first, rtol=1e-3)
+
+
 def test_the_kind_tells_whether_all_lights_were_known() -> None:
     coefficients, lights = known()
     some = resolve_from_lights(coefficients, [1, 4, 8, 2], lights[[1, 4, 8, 2]], powers=True)
@@ -91,12 +102,13 @@ def test_the_order_of_the_images_does_not_matter(powers: bool) -> None:
         ([0, 1, 2], False, "3 known light directions; at least 4"),
         ([0, 1, 10, 2], True, "10 is not in the stack; different numbers from 0 to 9"),
         ([0, 1, -1, 2], True, "-1 is not in the stack"),
+        ([0, 1, 2.5], True, "2.5]; whole numbers are accepted"),
         ([0, 1, 1, 2], True, "one is given twice"),
     ],
 )
 def test_images_that_cannot_be_used_are_refused(images, powers: bool, words: str) -> None:
     coefficients, lights = known()
-    given = lights[np.clip(images, 0, 9)]
+    given = lights[np.clip(images, 0, 9).astype(int)]
     with pytest.raises(InputError, match=words):
         resolve_from_lights(coefficients, images, given, powers=powers)
 

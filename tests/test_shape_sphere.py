@@ -86,6 +86,7 @@ def test_pixels_that_are_unknown_outside_or_on_the_rim_do_not_matter() -> None:
     bases, mask = painted()
     expected = resolve_from_sphere(bases, mask, CENTRE, RADIUS)
     _, inner = sphere_normals(SHAPE, CENTRE, 0.95 * RADIUS)
+    assert f"half of its {inner.sum()} pixels" in expected.note
     bases[:, ~inner] = np.random.default_rng(0).normal(size=(3, (~inner).sum()))
     bases[:, 20:30, 40:50] = np.nan
     mask = mask.copy()
@@ -93,6 +94,9 @@ def test_pixels_that_are_unknown_outside_or_on_the_rim_do_not_matter() -> None:
     bases[:, 50:60] = 7
     resolved = resolve_from_sphere(bases, mask, CENTRE, RADIUS)
     np.testing.assert_allclose(resolved.matrix, expected.matrix, atol=1e-4)
+    left = inner & mask
+    left[20:30, 40:50] = False
+    assert f"half of its {left.sum()} pixels" in resolved.note
 
 
 def test_noise_averages_out() -> None:

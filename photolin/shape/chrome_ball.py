@@ -76,6 +76,8 @@ def estimate_lights(images: NDArray[np.floating], mask: NDArray[np.bool_]) -> Ba
     directions, spots = np.full((len(images), 3), np.nan), np.full((len(images), 2), np.nan)
     doubts = []
     for k, image in enumerate(images):
+        if not np.isfinite(image[inside]).all():
+            raise InputError(f"image {k} of the ball holds NaN or infinity; numbers are accepted")
         weights, doubt = find_spot(image, inside)
         doubts.append(doubt)
         if weights.any():

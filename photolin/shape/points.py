@@ -81,6 +81,8 @@ def read_points(
             f"rows, columns and normals of the points have shapes {rows.shape}, {columns.shape} "
             f"and {known.shape}; (N,), (N,) and (N,3) are accepted"
         )
+    if len(rows) and not all(np.issubdtype(a.dtype, np.integer) for a in (rows, columns)):
+        raise InputError("rows and columns of the points are not whole; pixels are accepted")
     if len(rows) < MIN_POINTS:
         raise InputError(
             f"{len(rows)} points of known normal; at least {MIN_POINTS} are needed, "

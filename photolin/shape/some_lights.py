@@ -71,6 +71,8 @@ def check(
     if len(numbers) < least:
         kind = "lights with power" if least == 3 else "light directions"
         raise InputError(f"{len(numbers)} known {kind}; at least {least} are needed")
+    if not np.issubdtype(numbers.dtype, np.integer):
+        raise InputError(f"known lights of images {numbers.tolist()}; whole numbers are accepted")
     outside = numbers[(numbers < 0) | (numbers >= count)]
     if len(outside) or len(np.unique(numbers)) < len(numbers):
         wrong = outside[0] if len(outside) else numbers[0]

@@ -21,7 +21,9 @@ PIXELS = 3000
 DRAWS = 300
 """Random fours of pixels: one of all good pixels is among them if a third of all are good."""
 TOLERANCE = 6.0
-"""Degrees off the sphere's normal up to which a pixel agrees with a fit to four."""
+"""Degrees off the sphere's normal up to which a pixel agrees with a fit."""
+REGULAR = 1e-4
+"""Least volume that any three of four unit vectors must span."""
 AGREEING = 0.2
 """Least share of the pixels that must, for a sphere to be seen."""
 TRIM, ROUNDS = 4.0, 10
@@ -124,29 +126,26 @@ def trim(matrix: Floats, given: Floats, known: Floats) -> Floats:
 
 
 def find_start(given: Floats, known: Floats) -> Floats:
-    """Of exact fits to four pixels the one that most pixels agree with, fitted to those."""
+    """M of the exact fit to four pixels that most others agree with, and best (MSAC)."""
     drawn = np.random.default_rng(0).integers(0, len(given), (DRAWS, 4))
     unit = normalize(given)
     g, k = unit[drawn].swapaxes(1, 2), known[drawn].swapaxes(1, 2)  # (DRAWS,3,4), columns
-    regular = np.minimum(least_volume(g), least_volume(k)) > 1e-4
+    regular = np.minimum(least_volume(g), least_volume(k)) > REGULAR
     g, k = g[regular], k[regular]
     # both fourths in terms of the first three: M = K diag(those of k / those of g) G^-1
     ratio = np.linalg.solve(k[..., :3], k[..., 3:]) / np.linalg.solve(g[..., :3], g[..., 3:])
-    matrices = (k[..., :3] * ratio.swapaxes(1, 2)) @ np.linalg.inv(g[..., :3])
-    best, most = np.zeros(len(given), bool), 0
-    for matrix in matrices:
-        mapped = normalize(unit @ matrix.T)
-        cosine = (mapped * known).sum(axis=1)
-        cosine = cosine if cosine.sum() > 0 else -cosine
-        agrees = cosine > np.cos(np.radians(TOLERANCE))
-        if agrees.sum() > most:
-            best, most = agrees, agrees.sum()
-    if most < AGREEING * len(given):
+    best, most, agreeing = np.eye(3), 0.0, 0.0
+    for matrix in (k[..., :3] * ratio.swapaxes(1, 2)) @ np.linalg.inv(g[..., :3]):
+        chord = np.square(normalize(unit @ matrix.T) - known).sum(axis=1)
+        credit = np.maximum(1 - chord / np.radians(TOLERANCE) ** 2, 0)
+        if credit.sum() > most:
+            best, most, agreeing = matrix, credit.sum(), (credit > 0).mean()
+    if agreeing < AGREEING:
         raise DegenerateError(
             "the linearized values inside the outline are not those of a sphere; accepted is a "
             "matte sphere, with the row, column and radius of its outline"
         )
-    return fit_directions(given[best], known[best])
+    return best
 
 
 def least_volume(vectors: Floats) -> Floats:
