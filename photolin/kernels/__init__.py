@@ -20,8 +20,10 @@ from .cache import choose_cache
 choose_cache(Path(__file__).parent)
 
 from .consensus import consensus_rows  # noqa: E402
+from .diffuse import diffuse_rows  # noqa: E402
 from .evidence import evidence_rows  # noqa: E402
 from .fine import fine_band  # noqa: E402
+from .grazing import grazing_rows  # noqa: E402
 from .labels import label_rows  # noqa: E402
 from .neighbours import settle_rows  # noqa: E402
 from .pooled import clear_tile, pooled_tile  # noqa: E402
@@ -32,8 +34,10 @@ __all__ = [
     "centre_rows",
     "clear_tile",
     "consensus_rows",
+    "diffuse_rows",
     "evidence_rows",
     "fine_band",
+    "grazing_rows",
     "label_rows",
     "pooled_tile",
     "settle_rows",

@@ -1,4 +1,4 @@
-"""Everything that reads a user's files: one function, whatever the layout.
+"""Everything that reads a user's files, whatever the layout; colour one channel at a time.
 
 ================  ==================================================================================
 layout            what is read
@@ -18,6 +18,7 @@ a numbered name (``light01`` to ``light10``) is the stack. ``light_directions.tx
 """
 
 from .assemble import load_stack
+from .channels import ChannelImages, load_channels
 from .options import LoadOptions
 
-__all__ = ["LoadOptions", "load_stack"]
+__all__ = ["ChannelImages", "LoadOptions", "load_channels", "load_stack"]

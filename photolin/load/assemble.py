@@ -45,7 +45,7 @@ def load_stack(
         DegenerateError: the lights lie in one plane.
     """
     try:
-        layout = _with_options(find_layout(Path(path)), options)
+        layout = with_options(find_layout(Path(path)), options)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     plan = make_plan(layout, options)
@@ -85,7 +85,7 @@ def find_layout(path: Path) -> Layout:
     raise InputError(f"{path}: {what}; {accepted}")
 
 
-def _with_options(layout: Layout, options: LoadOptions) -> Layout:
+def with_options(layout: Layout, options: LoadOptions) -> Layout:
     """`layout` with the files that `options` name in place of its own."""
     if options.lights is not None:
         lights = () if options.lights == "none" else (Path(options.lights),)

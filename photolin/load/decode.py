@@ -33,6 +33,8 @@ class Plan:
     region: tuple[slice, slice]
     offset: float
     dark: Sequence[NDArray] | None = None
+    black: bool = False
+    """Whether an image may be all black, as one channel of it may be."""
 
 
 def make_plan(layout: Layout, options: LoadOptions) -> Plan:
@@ -81,6 +83,19 @@ def read_images(
     Raises:
         InputError: names the first image, in order, that cannot be used.
     """
+    images, top = read_values(layout, plan, progress)
+    return images, _fit(images, top, plan)
+
+
+def read_values(
+    layout: Layout, plan: Plan, progress: Progress | None
+) -> tuple[NDArray[np.float32], float]:
+    """All images (K,H,W) of the region as they are, negative or above 1 too, and the maximum of
+    the whole images.
+
+    Raises:
+        InputError: names the first image, in order, that cannot be used.
+    """
     frames = layout.frames
     rows, columns = plan.region
     images = np.empty(
@@ -103,7 +118,7 @@ def read_images(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return images, _fit(images, max(tops), plan)
+    return images, max(tops)
 
 
 def _read_image(frame: Frame, plan: Plan, power: NDArray | None) -> NDArray[np.float32]:
@@ -112,7 +127,7 @@ def _read_image(frame: Frame, plan: Plan, power: NDArray | None) -> NDArray[np.f
     image = one_channel(picture, plan.channel, plan.transfer, plan.dark, power)
     if not np.isfinite(image).all():
         raise InputError(f"{frame.where}: holds NaN or infinity; finite values are accepted")
-    if image[plan.region].max() <= 0:
+    if image[plan.region].max() <= 0 and not plan.black:
         once = "" if plan.dark is None else " once the dark frame is subtracted"
         raise InputError(f"{frame.where}: is all black{once}; take it out or replace it")
     return image

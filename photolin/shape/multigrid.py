@@ -1,0 +1,143 @@
+"""Weighted Laplace equations on a picture: one weight for each pair of neighbouring pixels."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.floating]
+
+COARSEST = 8
+"""Rows and columns that are solved outright."""
+SMOOTH = (0.35, 2.0)
+"""Eigenvalues of the scaled matrix, at most 2, that smoothing damps; coarser grids do the rest."""
+DEGREE = 3
+"""Steps of smoothing before and after the coarser grids."""
+LIMIT = 200
+"""Most steps of conjugate gradients."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The matrix A: (A z)_a = sum over neighbours b of weight_ab (z_a - z_b)."""
+
+    right: Floats
+    """(H,W) weights of each pixel and the next in its row; 0 in the last column."""
+    down: Floats
+    """(H,W) weights of each pixel and the one below; 0 in the last row."""
+    diagonal: Floats
+    """(H,W)"""
+    inverse: Floats
+    """(H,W) 1 / diagonal; 0 where a pixel has no neighbour."""
+
+    def times(self, z: Floats) -> Floats:
+        """A z, (H,W)."""
+        out = self.diagonal * z
+        out[:, :-1] -= self.right[:, :-1] * z[:, 1:]
+        out[:, 1:] -= self.right[:, :-1] * z[:, :-1]
+        out[:-1] -= self.down[:-1] * z[1:]
+        out[1:] -= self.down[:-1] * z[:-1]
+        return out
+
+
+def solve_laplace(
+    right: Floats,
+    down: Floats,
+    given: Floats,
+    start: Floats,
+    tolerance: float,
+    check: Callable[[], None] = lambda: None,
+) -> NDArray[np.float64]:
+    """Find z with sum over neighbours b of weight_ab (z_a - z_b) = given_a at each pixel a.
+
+    Conjugate gradients, preconditioned by one multigrid cycle on blocks of 2x2 pixels. On each
+    connected part z is determined up to a constant, which comes from `start`.
+
+    Args:
+        right, down: (H,W) weights >= 0 of each pixel and the next to the right, or below; 0 in the
+            last column, or row.
+        given: (H,W) float64; its sum over each connected part is 0.
+        start: (H,W) float64, a guess.
+        tolerance: largest norm of what is left of `given`, relative to its own.
+        check: called before each step; may raise.
+
+    Returns:
+        (H,W); the best found after LIMIT steps where the tolerance is not reached.
+    """
+    grid = _grid(right, down)
+    coarser, last = _coarsen(right.astype(np.float32), down.astype(np.float32))
+    z, rest = start, given - grid.times(start)
+    enough = tolerance**2 * (given * given).sum()
+    step, before = np.zeros_like(z), np.inf
+    for _ in range(LIMIT):
+        check()
+        if (rest * rest).sum() <= enough:
+            break
+        guess = _cycle(coarser, last, rest.astype(np.float32)).astype(np.float64)
+        now = (rest * guess).sum()
+        step = guess + now / before * step
+        image = grid.times(step)
+        length = now / (step * image).sum()
+        z, rest, before = z + length * step, rest - length * image, now
+    return z
+
+
+def _grid(right: Floats, down: Floats) -> Grid:
+    diagonal = right + down
+    diagonal[:, 1:] += right[:, :-1]
+    diagonal[1:] += down[:-1]
+    inverse = np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
+    return Grid(right, down, diagonal, inverse)
+
+
+def _coarsen(right: Floats, down: Floats) -> tuple[list[Grid], Floats]:
+    """Grids of blocks of 2x2 pixels, finest first, and the inverse matrix of the last.
+
+    The weight of two blocks is the mean of the two weights across their border, half of what the
+    Galerkin product of piecewise constant functions has: those are too stiff by that factor.
+    """
+    grids = [_grid(right, down)]
+    while max(right.shape) > COARSEST:
+        r, d = _pad(right), _pad(down)
+        right, down = (r[::2, 1::2] + r[1::2, 1::2]) / 2, (d[1::2, ::2] + d[1::2, 1::2]) / 2
+        grids.append(_grid(right, down))
+    units = np.eye(right.size, dtype=np.float64).reshape(-1, *right.shape)
+    matrix = np.stack([grids[-1].times(unit).ravel() for unit in units])
+    # constants, which have the eigenvalue 0, are left out
+    return grids, np.linalg.pinv(matrix, rcond=1e-7, hermitian=True).astype(np.float32)
+
+
+def _cycle(grids: list[Grid], last: Floats, rest: Floats) -> Floats:
+    """About A^-1 `rest`: smoothed here, corrected on coarser grids, smoothed again."""
+    if len(grids) == 1:
+        return (last @ rest.ravel()).reshape(rest.shape)
+    grid = grids[0]
+    z = _smooth(grid, rest, np.zeros_like(rest))
+    left = _pad(rest - grid.times(z))
+    blocks = left[::2, ::2] + left[1::2, ::2] + left[::2, 1::2] + left[1::2, 1::2]
+    coarse = _cycle(grids[1:], last, blocks)
+    H, W = rest.shape
+    z += coarse.repeat(2, axis=0).repeat(2, axis=1)[:H, :W]
+    return _smooth(grid, rest, z)
+
+
+def _smooth(grid: Grid, given: Floats, z: Floats) -> Floats:
+    """Chebyshev iteration (Saad, Iterative methods for sparse linear systems, 2003, alg. 12.1)."""
+    low, high = SMOOTH
+    middle, half = (high + low) / 2, (high - low) / 2
+    ratio = half / middle
+    step = grid.inverse * (given - grid.times(z)) / np.float32(middle)
+    z = z + step
+    for _ in range(DEGREE - 1):
+        new = 1 / (2 * middle / half - ratio)
+        change = grid.inverse * (given - grid.times(z))
+        step = np.float32(new * ratio) * step + np.float32(2 * new / half) * change
+        z, ratio = z + step, new
+    return z
+
+
+def _pad(values: Floats) -> Floats:
+    """With even numbers of rows and columns; what is added is 0."""
+    H, W = values.shape
+    return np.pad(values, ((0, H % 2), (0, W % 2)))
