@@ -1,5 +1,6 @@
 """Every file a user takes away: results, label maps, masks, linearized images."""
 
+from .arrays import result_npz
 from .files import (
     CONTENTS,
     Contents,
@@ -18,8 +19,8 @@ from .result import (
     load_result,
     load_result_source,
     load_result_stack,
+    load_shape,
     result_files,
-    result_npz,
     save_result,
 )
 
@@ -34,6 +35,7 @@ __all__ = [
     "load_result",
     "load_result_source",
     "load_result_stack",
+    "load_shape",
     "mask_png",
     "program_version",
     "result_files",

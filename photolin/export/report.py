@@ -5,7 +5,7 @@ import json
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import msgspec
 import numpy as np
@@ -14,6 +14,8 @@ from ..analysis import Analysis
 from ..errors import InputError
 from ..factors import TITLES, Factor, classifiable
 from ..load import LoadOptions
+from ..shape.recover import Shape
+from ..shape.resolved import Resolved
 
 RESULT, REPORT = "result.npz", "report.json"
 
@@ -43,6 +45,7 @@ class Report(TypedDict):
     seconds: dict[str, float]
     stack: str | None
     load: dict[str, Any] | None
+    shape: NotRequired[dict[str, Any] | None]
 
 
 def program_version() -> str:
@@ -104,6 +107,43 @@ def describe_confidence(analysis: Analysis, k: int) -> dict[str, float]:
         "gain": float(c.gain[k]),
         "saturated": float(c.saturated[k]),
     }
+
+
+def describe_shape(shape: Shape) -> dict[str, Any]:
+    """How the ambiguity of unknown lights was resolved, and the units of the shape's arrays."""
+    found = shape.resolved
+    each = found.residuals
+    return {
+        "kind": found.kind,
+        "matrix": found.matrix.tolist(),
+        "residual": found.residual,
+        "residual_means": found.residual_means,
+        "residuals": None if each is None else each.tolist(),
+        "scaled": found.scaled,
+        "note": found.note,
+        "px_mm": shape.px_mm,
+        "depth_unit": shape.unit,
+        "axes": "x right, y up, z to the camera",
+    }
+
+
+def restore_resolved(entry: dict[str, Any]) -> Resolved:
+    """What `describe_shape` wrote of the ambiguity."""
+    each = entry["residuals"]
+    return Resolved(
+        np.array(entry["matrix"], float).reshape(3, 3),
+        entry["kind"],
+        float(entry["residual"]),
+        bool(entry["scaled"]),
+        str(entry["note"]),
+        None if each is None else np.array(each, float),
+    )
+
+
+def finds_lights(report: Report) -> bool:
+    """Whether the lights of a result were found with its shape, not given with the stack."""
+    told = report.get("shape")
+    return told is not None and told.get("kind") != "lights"
 
 
 def describe_reading(options: LoadOptions) -> dict[str, Any]:

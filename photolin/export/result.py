@@ -1,67 +1,39 @@
 """A run on disk: `result.npz` holds the arrays, `report.json` says how they came about."""
 
 import hashlib
-import io
 import json
 import os
-import zipfile
-import zlib
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..analysis import Analysis, Confidence, Options
 from ..errors import InputError, OutputError, PhotolinError
-from ..factors import OUTSIDE, Thresholds
+from ..factors import Thresholds
 from ..load import LoadOptions, load_stack
+from ..shape.recover import Shape
 from ..stack import ImageStack
+from .arrays import CONFIDENCE, read_arrays, result_npz
 from .files import write_files
 from .report import (
     REPORT,
     RESULT,
     describe_analysis,
     describe_reading,
+    describe_shape,
+    finds_lights,
     foreign,
-    read_bytes,
     read_report,
     restore_reading,
+    restore_resolved,
 )
-
-ARRAYS = {
-    "labels": (np.uint8, "KHW"),
-    "coefficients": (np.float64, "K3"),
-    "base_images": (np.int64, "3"),
-    "linearized_bases": (np.float32, "3HW"),
-    "mask": (np.bool_, "HW"),
-    "determined": (np.bool_, "HW"),
-    "T": (np.float64, ""),
-    "Ts": (np.float64, ""),
-    "lights": (np.float64, "K3"),
-}
-"""Type and axes of each array in result.npz. Bases are 0 where they are not `determined`, for
-readers that do not expect NaN; `load_result` puts it back."""
-OPTIONAL = {"lights", "determined"}
-"""Not there when the stack had no lights, and in results of earlier versions."""
-
-CONFIDENCE = {
-    "lit": (np.uint16, "HW"),
-    "diffuse": (np.uint16, "HW"),
-    "margin": (np.uint16, "HW"),
-    "spread": (np.float32, "HW"),
-    "support": (np.float64, "K"),
-    "residual": (np.float64, "K"),
-    "gain": (np.float64, "K"),
-    "saturated": (np.float64, "K"),
-}
-"""The same for `analysis.Confidence`: all are there, or none where it was not measured."""
 
 
 def save_result(
     analysis: Analysis,
     folder: str | Path,
     *,
+    shape: Shape | None = None,
     command: str | None = None,
     stack_path: str | Path | None = None,
     load_options: LoadOptions | None = None,
@@ -70,6 +42,7 @@ def save_result(
 
     Args:
         analysis: what to write.
+        shape: of the same stack; its normals, albedo, depth and lights are written too.
         folder: made when missing.
         command: the command line that led here, for the report.
         stack_path, load_options: where the stack was read from and how, so that
@@ -81,7 +54,7 @@ def save_result(
     folder = Path(folder)
     check_output(folder)
     files = result_files(
-        analysis, command=command, stack_path=stack_path, load_options=load_options
+        analysis, shape=shape, command=command, stack_path=stack_path, load_options=load_options
     )
     write_files(folder, files)
 
@@ -89,16 +62,18 @@ def save_result(
 def result_files(
     analysis: Analysis,
     *,
+    shape: Shape | None = None,
     command: str | None = None,
     stack_path: str | Path | None = None,
     load_options: LoadOptions | None = None,
 ) -> dict[str, bytes]:
     """Encode what `save_result` writes, by the same arguments: file name to bytes."""
-    arrays = result_npz(analysis)
+    arrays = result_npz(analysis, shape)
     report = describe_analysis(analysis) | {
         "command": command,
         "stack": None if stack_path is None else str(Path(stack_path).resolve()),
         "load": None if load_options is None else describe_reading(load_options),
+        "shape": None if shape is None else describe_shape(shape),
         "result_sha256": hashlib.sha256(arrays).hexdigest(),
     }
     return {RESULT: arrays, REPORT: (json.dumps(report, indent=1) + "\n").encode()}
@@ -116,35 +91,6 @@ def check_output(folder: str | Path) -> None:
         raise OutputError(f"{there}: cannot be written; a writable folder is accepted")
 
 
-def result_npz(analysis: Analysis) -> bytes:
-    """Encode the arrays of `result.npz`; equal analyses give equal bytes.
-
-    Numpy dates every entry 1980, so no clock enters the archive.
-    """
-    known, bases = analysis.determined(), analysis.linearized_bases
-    if not known[analysis.mask].all():
-        bases = np.where(known, bases, 0)
-    arrays = {
-        "labels": analysis.labels,
-        "coefficients": analysis.coefficients,
-        "base_images": analysis.base_images,
-        "linearized_bases": bases,
-        "mask": analysis.mask,
-        "determined": known,
-        "T": analysis.thresholds.T,
-        "Ts": analysis.thresholds.Ts,
-    }
-    if analysis.lights is not None:
-        arrays["lights"] = analysis.lights
-    if analysis.confidence is not None:
-        arrays |= vars(analysis.confidence)
-    buffer = io.BytesIO()
-    kinds = ARRAYS | CONFIDENCE
-    typed = {name: np.asarray(value, kinds[name][0]) for name, value in arrays.items()}
-    np.savez_compressed(buffer, allow_pickle=False, **typed)
-    return buffer.getvalue()
-
-
 def load_result(path: str | Path) -> Analysis:
     """Read back what `save_result` wrote: equal to what was saved.
 
@@ -155,7 +101,7 @@ def load_result(path: str | Path) -> Analysis:
         InputError: a file is missing, cut short, or not a photolin result.
     """
     file = _result_file(path)
-    report, arrays = read_report(file), _read_arrays(file)
+    report, arrays = read_report(file), read_arrays(file)
     try:
         options = dict(report["options"])
         if options["base_images"] is not None:
@@ -180,11 +126,33 @@ def load_result(path: str | Path) -> Analysis:
             seconds={stage: float(s) for stage, s in report["seconds"].items()},
             title=report["title"],
             confidence=Confidence(**known) if known else None,
-            lights=arrays.get("lights"),
+            lights=None if finds_lights(report) else arrays.get("lights"),
             files=tuple((entry["path"], entry["sha256"]) for entry in report["files"]),
             notes=tuple(report["notes"]),
             warnings=tuple(report["warnings"]),
         )
+    except (KeyError, TypeError, ValueError, PhotolinError) as error:
+        raise foreign(file.with_name(REPORT)) from error
+
+
+def load_shape(path: str | Path) -> Shape | None:
+    """Read back the shape of a result; None where it has none.
+
+    Raises:
+        InputError: a file is missing, cut short, or not a photolin result.
+    """
+    file = _result_file(path)
+    told, arrays = read_report(file).get("shape"), read_arrays(file)
+    if told is None or "normals" not in arrays:
+        return None
+    try:
+        unknown = arrays["mask"] & ~arrays["determined"]
+        normals, albedo, depth = arrays["normals"], arrays["albedo"], arrays.get("depth")
+        normals[unknown] = albedo[unknown] = np.nan
+        if depth is not None and told["px_mm"] is not None:
+            depth = depth / np.float32(told["px_mm"])
+        resolved = restore_resolved(told)
+        return Shape(normals, albedo, depth, arrays["lights"], resolved, told["px_mm"])
     except (KeyError, TypeError, ValueError, PhotolinError) as error:
         raise foreign(file.with_name(REPORT)) from error
 
@@ -247,31 +215,3 @@ def _result_file(path: str | Path) -> Path:
     if not path.exists():
         raise InputError(f"{path}: does not exist; a folder that photolin run wrote is accepted")
     return path / RESULT if path.is_dir() else path
-
-
-def _read_arrays(file: Path) -> Mapping[str, NDArray]:
-    """The arrays of result.npz, each of the type and shape ARRAYS and CONFIDENCE say."""
-    kinds = ARRAYS | CONFIDENCE
-    try:
-        with np.load(io.BytesIO(read_bytes(file)), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in kinds if name in archive}
-    except (ValueError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise foreign(file) from error
-    if not set(ARRAYS) - OPTIONAL <= set(arrays):
-        raise foreign(file)
-    if set(CONFIDENCE) & set(arrays) not in (set(), set(CONFIDENCE)):
-        raise foreign(file)
-    sizes = {"3": 3}
-    for name, array in arrays.items():
-        dtype, axes = kinds[name]
-        if array.dtype != dtype or array.ndim != len(axes):
-            raise foreign(file)
-        for axis, size in zip(axes, array.shape, strict=True):
-            if sizes.setdefault(axis, size) != size:
-                raise foreign(file)
-    bases = set(arrays["base_images"].tolist())
-    if len(bases) != 3 or not bases <= set(range(len(arrays["labels"]))):
-        raise foreign(file)
-    if ((arrays["labels"] == OUTSIDE) == arrays["mask"]).any():
-        raise foreign(file)
-    return arrays
