@@ -1,4 +1,4 @@
-"""The command line: six verbs, one line for whatever goes wrong.
+"""The command line: the verbs, one line for whatever goes wrong.
 
 Exit status: 0 done, 1 a fault of photolin, 2 something the user can mend, 130 stopped by Ctrl-C.
 """
@@ -7,16 +7,14 @@ import functools
 import os
 import shlex
 import sys
-import time
-from collections.abc import Callable, Sequence
-from contextvars import ContextVar
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from .analysis import METHODS, Analysis, Options, Progress
+from .analysis import METHODS, Analysis, Options
 from .console import (
     MEASURES,
     complain,
@@ -24,7 +22,6 @@ from .console import (
     parse,
     progress_bar,
     run_summary,
-    stack_summary,
     stop_at_ctrl_c,
     thresholds,
 )
@@ -45,50 +42,16 @@ from .export import (
     save_result,
     write_files,
 )
-from .load import LoadOptions, load_stack
+from .load import LoadOptions
 from .paper import compare_with_paper
 from .pipeline import analyze
 from .stack import ImageStack
-from .synthetic import Truth, load_truth, render_scene, write_scene
-
-COMMAND: ContextVar[str] = ContextVar("command")
-"""The command line being run, as a shell would take it."""
-VERBS: dict[str, Callable[..., Callable[[], None]]] = {}
-"""Name of each verb and what makes its call."""
+from .synthetic import Truth, load_truth
+from .verbs import COMMAND, bind, read_stack
+from .verbs.scenes import info, synth
+from .verbs.shape import lights, measure_shape, shape
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command line (without the program's name) and return its exit status."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    mend_streams()
-    try:
-        if arguments == ["--version"]:
-            print(f"photolin {program_version()}")
-            return 0
-        COMMAND.set(shlex.join(["photolin", *arguments]))
-        parse(VERBS, arguments)()
-        sys.stdout.flush()
-    except SystemExit:  # --help
-        return 0
-    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except (Exception, KeyboardInterrupt) as error:
-        return complain(error)
-    return 0
-
-
-def verb(function: Callable[..., None]) -> Callable[..., None]:
-    """Add a verb; parsing gives the call instead of making it, so errors keep apart."""
-
-    @functools.wraps(function)
-    def bind(*args: object, **kwargs: object) -> Callable[[], None]:
-        return functools.partial(function, *args, **kwargs)
-
-    VERBS[function.__name__] = bind
-    return function
-
-
-@verb
 def run(
     stack: Positional[Path],
     out: Positional[Path],
@@ -99,6 +62,8 @@ def run(
 ) -> None:
     """Linearize a stack, label every pixel, and write OUT/result.npz and OUT/report.json.
 
+    With known lights, normals and albedo too.
+
     Args:
         stack: Folder of images, multi-page TIFF, .npy or .npz.
         out: Folder for the result; made when missing, an earlier result in it is replaced.
@@ -108,15 +73,26 @@ def run(
     if os.path.realpath(stack) in map(os.path.realpath, (out, out / "result.npz")):
         raise OutputError(f"{out}: holds the input; another folder is accepted")
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
-        images, seconds = _load(stack, reading, progress)
+        images, seconds = read_stack(stack, reading, progress)
         result = analyze(images, analysis, threads=threads, progress=progress, cancel=cancel)
+        normals = None
+        if images.lights is not None:
+            result, normals = measure_shape(
+                images, result, depth=False, threads=threads, progress=progress, cancel=cancel
+            )
     result = replace(result, seconds={"load": seconds, **result.seconds})
-    save_result(result, out, command=COMMAND.get(), stack_path=stack, load_options=reading)
+    save_result(
+        result,
+        out,
+        shape=normals,
+        command=COMMAND.get(),
+        stack_path=stack,
+        load_options=reading,
+    )
     print(run_summary(result))
     print(f"written {out / 'result.npz'} and {out / 'report.json'}")
 
 
-@verb
 def inspect(
     path: Positional[Path],
     analysis: Options = Options(),
@@ -141,7 +117,7 @@ def inspect(
     result = load_result(path) if is_result(path) else None
     with progress_bar() as progress:
         if result is None:
-            images, _ = _load(path, reading, progress)
+            images, _ = read_stack(path, reading, progress)
         else:
             images = load_result_stack(path, stack)
             was, reading = load_result_source(path)
@@ -161,7 +137,6 @@ def inspect(
     )
 
 
-@verb
 def export(
     result: Positional[Path],
     out: Positional[Path],
@@ -188,7 +163,6 @@ def export(
     print(f"written {len(files)} files to {out}")
 
 
-@verb
 def evaluate(
     path: Positional[Path],
     truth: Positional[Path | None] = None,
@@ -219,7 +193,7 @@ def evaluate(
         return
     answer = load_truth(path if truth is None else truth)
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
-        images, _ = _load(path, reading, progress)
+        images, _ = read_stack(path, reading, progress)
         each = [Options(method, T, Ts, seed=seed) for method in METHODS]
         results = [
             analyze(images, o, threads=threads, progress=progress, cancel=cancel) for o in each
@@ -228,58 +202,6 @@ def evaluate(
         print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
     print(compare_with_paper({r.options.method: _measure(r, answer, images) for r in results}))
     print(MEASURES)
-
-
-@verb
-def synth(
-    name: Positional[str],
-    out: Positional[Path],
-    *,
-    size: tuple[int, int] | None = None,
-    images: int | None = None,
-    noise: float = 0.0,
-    bits: Literal[8, 16] = 16,
-    ambient: float = 0.0,
-    seed: int = 0,
-) -> None:
-    """Render a scene with exact ground truth: images and gt.npz.
-
-    Args:
-        name: sphere_cone, cup, pot or sphere_obstacles.
-        out: New folder for the images and their truth.
-        size: Rows and columns, 16 to 4096; the scene's own when left out.
-        images: Number of images, one light each, 6 to 1000; the scene's own when left out.
-        noise: Standard deviation of Gaussian noise, fraction of full scale.
-        bits: Bits of a pixel.
-        ambient: Constant light added everywhere, fraction of full scale.
-        seed: Seed of the noise.
-    """
-    scene = render_scene(
-        name, size=size, images=images, seed=seed, noise=noise, bits=bits, ambient=ambient
-    )
-    write_scene(scene, out)
-    K, H, W = scene.stack.shape
-    print(f"written {K} images of {H} rows x {W} columns and gt.npz to {out}")
-
-
-@verb
-def info(stack: Positional[Path], reading: LoadOptions = LoadOptions()) -> None:
-    """Say what is read from a stack: size, transfer, mask, lights, brightness of each image.
-
-    Args:
-        stack: What run accepts.
-    """
-    with progress_bar() as progress:
-        images, seconds = _load(stack, reading, progress)
-    print(stack_summary(images))
-    print(f"read in {seconds:.2f} s")
-
-
-def _load(path: Path, reading: LoadOptions, progress: Progress | None) -> tuple[ImageStack, float]:
-    """The stack and the seconds it took to read."""
-    start = time.perf_counter()
-    images = load_stack(path, reading, progress=progress)
-    return images, time.perf_counter() - start
 
 
 def _measure(result: Analysis, truth: Truth, stack: ImageStack | None) -> Evaluation:
@@ -293,3 +215,30 @@ def _stack_of(result: Path) -> ImageStack | None:
         return load_result_stack(result)
     except InputError:
         return None
+
+
+VERBS = {
+    verb.__name__: bind(verb)
+    for verb in (run, inspect, shape, export, evaluate, lights, synth, info)
+}
+"""Name of each verb and what makes its call."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line (without the program's name) and return its exit status."""
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    mend_streams()
+    try:
+        if arguments == ["--version"]:
+            print(f"photolin {program_version()}")
+            return 0
+        COMMAND.set(shlex.join(["photolin", *arguments]))
+        parse(VERBS, arguments)()
+        sys.stdout.flush()
+    except SystemExit:  # --help
+        return 0
+    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (Exception, KeyboardInterrupt) as error:
+        return complain(error)
+    return 0

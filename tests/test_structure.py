@@ -26,6 +26,7 @@ FLOORS = (
     ("pipeline",),
     ("export",),
     ("console",),
+    ("verbs",),
     ("cli",),
     ("__init__", "__main__"),
 )

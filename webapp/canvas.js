@@ -5,10 +5,12 @@
 // its image on screen is a similarity, described by {scale, left, top} in CSS pixels.
 "use strict";
 
-window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyId, viewId }) => {
+window.openCanvas = ({
+  rows, columns, planes, relief, worldHeight, hoverId, pickId, keyId, viewId, lightId,
+}) => {
   window.photolin?.close();
 
-  const TRUCK = 2, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
+  const ROTATE = 1, TRUCK = 2, TOUCH_ROTATE = 64, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
   const NEAREST = 1003; // three.js NearestFilter
   const MARGIN = 0.98, GRID_SCALE = 16, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
   const HOVER_MS = 50, VIEW_MS = 150;
@@ -33,6 +35,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   let size = null; // [width, height] of the canvas that the camera was placed for
   let fitted = null; // pose that fit() chose, to stay fitted when the window changes
   let peeking = false; // space bar held: without overlay
+  let orbiting = false; // the picture lies on the relief, and the camera turns around it
 
   const hasPicture = () => Boolean(viewer.nodeRefFromName[planes[0]] && viewer.cameraControl);
   const placed = () => size !== null && hasPicture();
@@ -77,6 +80,90 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   function fit() {
     place(axes()[3], distanceAt(fitScale()));
     fitted = pose();
+    if (orbiting) unlock();
+  }
+
+  /** Let the camera turn around the relief, from where it is. */
+  function unlock() {
+    const controls = viewer.cameraControl;
+    Object.assign(controls, {
+      minAzimuthAngle: -Infinity, maxAzimuthAngle: Infinity, minPolarAngle: 0, maxPolarAngle: Math.PI,
+    });
+    controls.mouseButtons.left = ROTATE;
+    controls.touches.one = TOUCH_ROTATE;
+    controls.dollyToCursor = false;
+  }
+
+  /** Lay the picture on the relief and turn around it, or go back to the flat picture. */
+  function setOrbit(on) {
+    if (on === orbiting) return;
+    orbiting = on;
+    layer.classList.toggle("photolin-orbit", on);
+    grid.hidden = true;
+    // near and far decide how finely depths are told apart
+    Object.assign(camera, on ? { near: 0.1, far: 1e3 } : { near: 1e-4, far: 1e4 });
+    camera.updateProjectionMatrix();
+    if (!hasPicture()) return;
+    if (!on) lock();
+    fit();
+  }
+
+  function lock() {
+    const controls = viewer.cameraControl;
+    controls.mouseButtons.left = controls.mouseButtons.right = TRUCK;
+    controls.touches.one = TOUCH_TRUCK;
+    controls.touches.two = controls.touches.three = TOUCH_DOLLY_TRUCK;
+    controls.dollyToCursor = true;
+  }
+
+  /** Meshes of the relief: its surface, and the same again for the overlay; none without one. */
+  const dressed = new Map(); // geometry of a surface -> [picture, overlay]
+
+  function dressRelief() {
+    const node = viewer.nodeRefFromName[relief];
+    const maps = planes.map((name) => {
+      let found = null;
+      viewer.nodeRefFromName[name]?.traverse((mesh) => (found ??= mesh.isMesh && mesh.material.map ? mesh : null));
+      return found;
+    });
+    const sources = [];
+    node?.traverse((mesh) => mesh.isMesh && !mesh.userData.photolin && sources.push(mesh));
+    for (const source of sources) {
+      if (!maps[0]) continue;
+      if (!dressed.has(source.geometry)) dressed.set(source.geometry, dress(source, maps[0].material));
+      source.material.visible = false;
+      dressed.get(source.geometry).forEach((mesh, order) => {
+        const map = maps[order]?.material.map ?? null;
+        if (mesh.material.map !== map) {
+          mesh.material.map = map;
+          mesh.material.needsUpdate = true;
+        }
+        mesh.visible = orbiting && Boolean(map) && planeShown(order);
+      });
+    }
+  }
+
+  const planeShown = (order) =>
+    !(peeking && order > 0) && Boolean(viewer.nodeRefFromName[planes[order]]?.visible ?? true);
+
+  /** Two meshes with the geometry of `source` that show pictures as they are, without light. */
+  function dress(source, like) {
+    const { geometry } = source;
+    const at = geometry.attributes.position;
+    const uv = new Float32Array(2 * at.count);
+    for (let n = 0; n < at.count; n++) {
+      uv[2 * n] = at.getX(n) / (columns * worldPixel) + 0.5;
+      uv[2 * n + 1] = 0.5 - at.getY(n) / worldHeight;
+    }
+    geometry.setAttribute("uv", new at.constructor(uv, 2));
+    return planes.map((_, order) => {
+      const material = new like.constructor({ side: 2, toneMapped: false, transparent: order > 0 });
+      const mesh = new source.constructor(geometry, material);
+      mesh.userData.photolin = true;
+      mesh.renderOrder = order;
+      source.add(mesh);
+      return mesh;
+    });
   }
 
   /** One image pixel on one pixel of the device, around the present centre, edges on edges. */
@@ -119,12 +206,12 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   function beforeRender() {
     if (!hasPicture()) return;
     if (size === null) configure();
-    else followSize();
+    else if (!orbiting) followSize();
     planes.forEach((name, order) =>
       viewer.nodeRefFromName[name]?.traverse((mesh) => {
         if (!mesh.isMesh || !("map" in mesh.material)) return;
         const { material } = mesh;
-        mesh.visible = Boolean(material.map) && !(peeking && order > 0);
+        mesh.visible = Boolean(material.map) && !(peeking && order > 0) && !orbiting;
         mesh.renderOrder = order; // planes lie in one another: drawn in turn, without depth
         material.depthTest = material.depthWrite = false;
         if (material.map && material.map.magFilter !== NEAREST) {
@@ -133,8 +220,9 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
         }
       }),
     );
+    dressRelief();
     drawMarks();
-    tellView();
+    if (!orbiting) tellView();
   }
 
   let viewed = "", viewTimer = null;
@@ -157,11 +245,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   function configure() {
     Object.assign(camera, { fov: 30, near: 1e-4, far: 1e4 });
     camera.updateProjectionMatrix();
-    const controls = viewer.cameraControl;
-    controls.mouseButtons.left = controls.mouseButtons.right = TRUCK;
-    controls.touches.one = TOUCH_TRUCK;
-    controls.touches.two = controls.touches.three = TOUCH_DOLLY_TRUCK;
-    controls.dollyToCursor = true;
+    lock();
     fit();
   }
 
@@ -203,6 +287,8 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
   }
 
   function drawMarks() {
+    for (const { element } of marks) element.hidden = orbiting;
+    if (orbiting) return;
     const { scale, left, top } = similarity();
     for (const { element, row, column, ring } of marks) {
       const side = ring ? Math.max(scale + 4, 13) : 0;
@@ -222,6 +308,51 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
       `linear-gradient(${line}) 0 ${top - y}px/100% ${scale}px`;
   }
 
+  // --- the light that a relit picture is seen under ---
+
+  const BALL = 110; // CSS pixels
+  const ball = layer.appendChild(document.createElement("div"));
+  ball.className = "photolin-light";
+  ball.title = "Drag: the light that the picture is seen under (middle: from the camera, rim: grazing)";
+  ball.style.cssText =
+    `position:absolute;right:14px;bottom:14px;width:${BALL}px;height:${BALL}px;border-radius:50%;` +
+    "pointer-events:auto;cursor:grab;touch-action:none;border:1px solid #fff8;box-shadow:0 0 0 1px #0008";
+  const spot = ball.appendChild(document.createElement("div"));
+  spot.style.cssText =
+    "position:absolute;width:12px;height:12px;margin:-6px 0 0 -6px;border-radius:50%;" +
+    "background:#ffd43b;border:1px solid #000;pointer-events:none";
+  ball.hidden = true;
+
+  /** Show the light ball with its spot at x right, y up, of a unit direction; null hides it. */
+  function setLight(light) {
+    ball.hidden = light === null;
+    if (light !== null && !ball.matches(":active")) drawLight(...light);
+  }
+
+  function drawLight(x, y) {
+    const [left, top] = [50 + 50 * x, 50 - 50 * y];
+    spot.style.left = `${left}%`;
+    spot.style.top = `${top}%`;
+    ball.style.background = `radial-gradient(circle at ${left}% ${top}%, #e8e8e8, #333 75%)`;
+  }
+
+  let lightTimer = null, light = null;
+
+  function dragLight(event) {
+    if (!(event.buttons & 1)) return;
+    const box = ball.getBoundingClientRect();
+    let x = (2 * (event.clientX - box.left)) / box.width - 1;
+    let y = 1 - (2 * (event.clientY - box.top)) / box.height;
+    const length = Math.hypot(x, y);
+    if (length > 0.99) [x, y] = [(0.99 * x) / length, (0.99 * y) / length];
+    drawLight(x, y);
+    light = `${x.toFixed(4)},${y.toFixed(4)}`;
+    lightTimer ??= setTimeout(() => {
+      lightTimer = null;
+      send(lightId, light);
+    }, HOVER_MS);
+  }
+
   // --- pointer and keys ---
 
   let hovered = "", hoverTimer = null;
@@ -235,9 +366,27 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     }, HOVER_MS);
   }
 
+  /** The ray through the pointer in pixels: "ray column,row,height,..." of the eye and a direction. */
+  function rayUnder(event) {
+    const box = canvas.getBoundingClientRect();
+    const middle = 0.5 / window.devicePixelRatio;
+    const far = camera.position.clone().set(
+      (2 * (event.clientX + middle - box.left)) / canvas.clientWidth - 1,
+      1 - (2 * (event.clientY + middle - box.top)) / canvas.clientHeight,
+      0.5,
+    );
+    const [right, down, into, centre] = axes();
+    const direction = far.unproject(camera).sub(camera.position).normalize();
+    const eye = camera.position.clone().sub(centre).divideScalar(worldPixel);
+    const inPixels = (v, c, r) => [v.dot(right) + c, v.dot(down) + r, -v.dot(into)];
+    const numbers = [...inPixels(eye, columns / 2, rows / 2), ...inPixels(direction, 0, 0)];
+    return `ray ${numbers.map((n) => n.toFixed(6)).join(",")}`;
+  }
+
   /** The pixel under the middle of the device pixel that the pointer is on, "" beside the picture. */
   function pixelUnder(event) {
     if (!placed()) return "";
+    if (orbiting) return rayUnder(event);
     const box = canvas.getBoundingClientRect();
     const { scale, left, top } = similarity();
     const middle = 0.5 / window.devicePixelRatio;
@@ -299,6 +448,8 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     if (!event.repeat && placed()) action();
   }
 
+  for (const type of ["pointerdown", "pointermove"]) listen(ball, type, dragLight);
+  listen(ball, "pointerdown", (event) => ball.setPointerCapture(event.pointerId));
   listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
   listen(canvas, "pointerleave", () => hover(""));
   listen(canvas, "pointerdown", (event) => {
@@ -352,6 +503,7 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     closing.abort();
     clearTimeout(hoverTimer);
     clearTimeout(viewTimer);
+    clearTimeout(lightTimer);
     layer.remove();
     style.remove();
     scene.onBeforeRender = () => {};
@@ -362,6 +514,8 @@ window.openCanvas = ({ rows, columns, planes, worldHeight, hoverId, pickId, keyI
     oneToOne: () => placed() && oneToOne(),
     similarity: () => (placed() ? similarity() : null),
     setMarks,
+    setOrbit,
+    setLight,
     setReadout,
     close,
   };

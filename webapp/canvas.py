@@ -16,6 +16,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 import viser
 
+from photolin.shape.recover import Shape
+
+from .relief import MESH, Relief
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
 WORLD_HEIGHT = 10.0
@@ -61,20 +64,23 @@ class Canvas:
         )
         # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
         # screens with more than one pixel in it: the page writes them into hidden fields.
-        self._hover, self._pick, self._key, self._view = (
+        self._hover, self._pick, self._key, self._view, self._light = (
             client.gui.add_text(name, "", visible=False)
-            for name in ("hover", "pick", "key", "view")
+            for name in ("hover", "pick", "key", "view", "light")
         )
+        self._relief = Relief(client, height, width, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
             "columns": width,
             "planes": _PLANES,
+            "relief": MESH,
             "worldHeight": WORLD_HEIGHT,
             "hoverId": widget_id(self._hover),
             "pickId": widget_id(self._pick),
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
+            "lightId": widget_id(self._light),
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -99,6 +105,22 @@ class Canvas:
         self._pins = tuple(pins)
         self._send_marks()
 
+    def set_surface(self, shape: Shape | None) -> None:
+        """The surface that the picture can be laid on; None removes it."""
+        self._relief.set(shape)
+
+    def set_orbit(self, on: bool) -> None:
+        """Lay the picture on the surface and let the camera turn around it, or show it flat."""
+        call_javascript(self._client, "window.photolin.setOrbit", on)
+
+    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
+        """Draw the lights of a shape around it, that of image `chosen` in a colour."""
+        self._relief.set_arrows(shape, chosen, visible)
+
+    def set_light(self, light: tuple[float, float] | None) -> None:
+        """Show the ball on which a light is dragged, at x right, y up; None hides it."""
+        call_javascript(self._client, "window.photolin.setLight", light)
+
     def set_readout(self, text: str) -> None:
         """Write one line in the lower left corner; an empty text removes it."""
         if text != self._readout:
@@ -118,8 +140,7 @@ class Canvas:
 
         @self._pick.on_update
         async def _(_: viser.GuiEvent) -> None:
-            pixel = pixel_in_text(self._pick.value.partition(" ")[2], self._shape)
-            if pixel is not None:
+            if (pixel := self._pixel(self._pick.value.partition(" ")[2])) is not None:
                 callback(pixel)
 
     def on_hover(self, callback: Callable[[Pixel | None], None]) -> None:
@@ -127,7 +148,7 @@ class Canvas:
 
         @self._hover.on_update
         async def _(_: viser.GuiEvent) -> None:
-            callback(pixel_in_text(self._hover.value, self._shape))
+            callback(self._pixel(self._hover.value))
 
     def on_view(self, callback: Callable[[Window], None]) -> None:
         """Call back with the part of the picture on screen, once it has come to rest."""
@@ -136,6 +157,14 @@ class Canvas:
         async def _(_: viser.GuiEvent) -> None:
             if (window := window_in_text(self._view.value, self._shape)) is not None:
                 callback(window)
+
+    def on_light(self, callback: Callable[[tuple[float, float]], None]) -> None:
+        """Call back with x right and y up of the unit direction that the light is dragged to."""
+
+        @self._light.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if (light := light_in_text(self._light.value)) is not None:
+                callback(light)
 
     def on_key(self, callback: Callable[[str], None]) -> None:
         """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
@@ -147,6 +176,9 @@ class Canvas:
         @self._key.on_update
         async def _(_: viser.GuiEvent) -> None:
             callback(self._key.value.partition(" ")[2])
+
+    def _pixel(self, text: str) -> Pixel | None:
+        return pixel_in_text(text, self._shape) or self._relief.pixel_on(text)
 
     def _send_marks(self) -> None:
         marker = [] if self._marker is None else [(*self._marker, "")]
@@ -169,6 +201,15 @@ def pixel_in_text(text: str, shape: tuple[int, int]) -> Pixel | None:
     numbers = re.fullmatch(r"([0-9]{1,6}),([0-9]{1,6})", text)
     pixel = (int(numbers[1]), int(numbers[2])) if numbers else shape
     return pixel if pixel[0] < shape[0] and pixel[1] < shape[1] else None
+
+
+def light_in_text(text: str) -> tuple[float, float] | None:
+    """x and y of a direction on the camera's side that the page wrote as "x,y", or None."""
+    number = r"(-?[01]\.[0-9]{1,6})"
+    if (found := re.fullmatch(f"{number},{number}", text)) is None:
+        return None
+    x, y = float(found[1]), float(found[2])
+    return (x, y) if x * x + y * y < 1 else None
 
 
 @functools.cache

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from photolin.analysis import Analysis, Method
 from photolin.factors import Thresholds, classify
 from photolin.label import label_images
+from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 from .live import Preview
@@ -31,6 +32,8 @@ class Frame:
     """The same by the method compared with."""
     preview: Preview | None = None
     """What the labels are by, where no run has caught up with the view's thresholds."""
+    shape: Shape | None = None
+    """The latest shape; None while there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,7 @@ def compose(
     results: Mapping[Method, Analysis],
     state: ViewState,
     preview: Preview | None = None,
+    shape: Shape | None = None,
 ) -> Frame:
     """The frame of a view.
 
@@ -65,7 +69,7 @@ def compose(
     )
     if preview is not None and analysis is preview.near and labels is not None:
         labels = preview.paint(labels, state.image)
-    return Frame(stack, state, analysis, beside, labels, beside_labels, preview)
+    return Frame(stack, state, analysis, beside, labels, beside_labels, preview, shape)
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

@@ -1,5 +1,7 @@
 """Draws frames on the canvas, each part only when it differs from what is there."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,12 +17,14 @@ from .render import (
     render_linearized,
     render_residual,
 )
-from .state import ENCODINGS
+from .state import ENCODINGS, SURFACE
+from .surface import render_surface
 
 SIGNED = ("linearized", "residual")
-"""Layers with colours of their own."""
+"""Layers of a result with colours of their own."""
 KEPT = 32
 """Encoded pictures kept for stepping back and forth."""
+Marks = Sequence[tuple[int, int, str]]
 LARGE = 400_000
 """Pixels above which a picture is first sent as JPEG, and without loss once nothing changes."""
 
@@ -38,11 +42,14 @@ class Painter:
         self._rough = False
         self._encoded: dict[tuple[object, ...], tuple[bytes, str]] = {}
 
-    def paint(self, frame: Frame, pointer: Pixel | None, *, rested: bool) -> bool:
+    def paint(
+        self, frame: Frame, pointer: Pixel | None, marks: Marks = (), *, rested: bool
+    ) -> bool:
         """Show a frame.
 
         Args:
             pointer: (row, column) under the pointer, whose values the readout says.
+            marks: (row, column, text) that are put on the picture.
             rested: nothing has changed for a while: send the picture without loss.
 
         Returns:
@@ -50,7 +57,9 @@ class Painter:
         """
         state = frame.state
         result = frame.analysis if state.layer in SIGNED else None
-        look = (state.image, state.layer, state.gain, result)
+        shape = frame.shape if state.layer in SURFACE else None
+        light = state.light if state.layer == "relit" else None
+        look = (state.image, state.layer, state.gain, result, shape, light)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
         if self._is_new("picture", *look, choice) or (exact and self._rough):
@@ -60,6 +69,9 @@ class Painter:
         self._paint_overlay(frame)
         if self._is_new("marker", state.pixel):
             self._canvas.set_marker(state.pixel)
+        if self._is_new("marks", marks):
+            self._canvas.set_pins(marks)
+        self._paint_surface(frame)
         caption = self._legend + (HIDDEN if hides_labels(frame) else "")
         self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
         return self._rough
@@ -70,7 +82,7 @@ class Painter:
         if found is None:
             picture, legend = render_layer(frame)
             found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
-        if frame.state.layer not in SIGNED:  # of those, results would be kept alive
+        if frame.state.layer not in (*SIGNED, *SURFACE):  # these would keep results alive
             self._encoded[key] = found  # the latest are last
         for oldest in list(self._encoded)[:-KEPT]:
             del self._encoded[oldest]
@@ -92,6 +104,20 @@ class Painter:
             )
         self._canvas.set_overlay(overlay)
 
+    def _paint_surface(self, frame: Frame) -> None:
+        """The surface, whether the picture lies on it, and the lights around it."""
+        state, shape = frame.state, frame.shape
+        turning = state.relief and shape is not None
+        if turning and self._is_new("surface", shape):
+            self._canvas.set_surface(shape)
+        if self._is_new("orbit", turning):
+            self._canvas.set_orbit(turning)
+        if self._is_new("arrows", shape, state.image, turning and state.arrows):
+            self._canvas.set_arrows(shape, state.image, turning and state.arrows)
+        light = state.light if state.layer == "relit" and shape is not None else None
+        if self._is_new("light", light):
+            self._canvas.set_light(light)
+
     def _is_new(self, part: str, *key: object) -> bool:
         if self._drawn.get(part) == key:
             return False
@@ -105,13 +131,16 @@ def hides_labels(frame: Frame) -> bool:
     Outlines leave enough of it to be seen.
     """
     state = frame.state
-    return state.layer in SIGNED and frame.labels is not None and not state.outlines
+    coloured = state.layer in SIGNED or (state.layer in SURFACE and frame.shape is not None)
+    return coloured and frame.labels is not None and not state.outlines
 
 
 def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
     """The picture under the overlay, (H,W) or (H,W,3), and what its greys or colours mean."""
     state, stack = frame.state, frame.stack
-    if frame.analysis is None or state.layer in ("input", "labels"):
+    if state.layer in SURFACE and frame.shape is not None:
+        return render_surface(frame.shape, state.layer, state.light, stack.mask)
+    if frame.analysis is None or state.layer not in SIGNED:
         gain = state.gain or 1.0
         shown = "" if gain == 1 else f", shown {gain:g} times brighter"
         return render_input(stack.images[state.image], gain), f"{state.layer}{shown}"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from photolin.analysis import Analysis
 from photolin.factors import LETTERS, OUTSIDE, TITLES, Factor, Thresholds, classify
+from photolin.shape.recover import Shape
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,22 @@ def threshold_status(
         f"Labels: T {T}, Ts {Ts}. Linearized bases: T {T_used}, Ts {Ts_used}; "
         "linearize again to match."
     )
+
+
+def describe_shape(shape: Shape) -> str:
+    """How the ambiguity of unknown lights was resolved, and what is left open."""
+    found = shape.resolved
+    unknown = int(np.count_nonzero(np.isnan(shape.albedo)))
+    sentences = [f"Normals {found.note}."]
+    if unknown:
+        sentences.append(f"{unknown} pixels have too few observations for a normal.")
+    if shape.depth is not None:
+        z = shape.lengths(shape.depth)
+        z = z[np.isfinite(z)]
+        sentences.append(f"Depth spans {np.ptp(z):.4g} {shape.unit}.")
+    if not found.scaled:
+        sentences.append("Albedo has no absolute scale.")
+    return " ".join(sentences)
 
 
 def summarize(analysis: Analysis) -> str:

@@ -26,13 +26,14 @@ from .frame import Frame, compose
 from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
-from .state import ViewState
+from .state import SURFACE, ViewState
 from .views.export import ExportView
 from .views.help import HelpView
 from .views.legend import LegendView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
+from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
 from .views.thresholds import ThresholdView
@@ -56,6 +57,7 @@ class Session:
         self._shown_results: dict[Method, Analysis] | None = None
         self._pixel: Pixel | None = None
         self._pointer: Pixel | None = None
+        self._light = ViewState.light
         T, Ts = runs.options.T, runs.options.Ts
         self._first = Thresholds(FIRST.T if T is None else T, FIRST.Ts if Ts is None else Ts)
         if runs.result is not None:
@@ -99,18 +101,21 @@ class Session:
                 self._legend = LegendView(gui, self._stack, changed)
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
+        with tabs.add_tab("Shape", viser.Icon.STACK_3D):
+            self._shape_view = ShapeView(gui, self._stack, changed, self._recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self._export = ExportView(gui, self._work.download)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self._picture, self._thresholds, self._pixel_view)
-        self._readers = (self._run, *both, self._legend)
-        self._drawers = (*both, self._shares, self._summary)
+        self._readers = (self._run, *both, self._legend, self._shape_view)
+        self._drawers = (*both, self._shares, self._summary, self._shape_view)
         self._keys = self._bind_keys()
         canvas.on_pick(self._pick)
         canvas.on_hover(self._point)
         canvas.on_key(self._press)
         canvas.on_view(self._see)
+        canvas.on_light(self._shine)
 
     # --- what the work does ---
 
@@ -121,6 +126,7 @@ class Session:
             busy=self._busy,
             progress=self._progress,
             send=self._send,
+            shaped=self._shaped,
             tell=self._tell,
             refuse=self._refuse,
             changed=self._wake.set,
@@ -138,6 +144,12 @@ class Session:
     def _send(self, name: str, data: bytes) -> None:
         # viser's page itself tells the name and the size
         self._client.send_file_download(name, data, save_immediately=True)
+
+    def _shaped(self) -> None:
+        self._picture.offer(surface=True)
+        if self._read().layer not in SURFACE:
+            self._picture.show("relit")
+        self._wake.set()
 
     def _refuse(self) -> None:
         self._notify("Still running", "wait until it ends, or cancel it, and try again", "gray")
@@ -162,6 +174,8 @@ class Session:
             "r": self._work.linearize,
             "s": self._work.suggest,
             "e": lambda: self._work.download(*self._export.chosen()),
+            "n": self._recover,
+            "d": self._shape_view.toggle,
             "escape": self._work.stop,
         }
 
@@ -173,8 +187,20 @@ class Session:
         except Exception as error:
             self._report(error)
 
+    def _recover(self) -> None:
+        view = self._shape_view
+        try:
+            self._work.recover(view.known(), view.given_lights(), view.px_mm())
+        except PhotolinError as error:
+            self._tell(error)
+
     def _pick(self, pixel: Pixel) -> None:
-        self._pixel = pixel
+        if not self._shape_view.take(pixel):
+            self._pixel = pixel
+            self._wake.set()
+
+    def _shine(self, light: tuple[float, float]) -> None:
+        self._light = light
         self._wake.set()
 
     def _point(self, pixel: Pixel | None) -> None:
@@ -202,7 +228,7 @@ class Session:
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""
-        state = ViewState(pixel=self._pixel)
+        state = ViewState(pixel=self._pixel, light=self._light)
         for view in self._readers:
             state = view.read(state)
         return state
@@ -215,15 +241,20 @@ class Session:
         rested = monotonic() - self._changed >= REST
         self._work.ensure(state)
         preview = self._follow(state, results)
-        known = frame is not None and state == frame.state and results is self._shown_results
+        shape, marks = self._work.shape, self._shape_view.marks
+        known = (
+            frame is not None
+            and (state, shape) == (frame.state, frame.shape)
+            and results is self._shown_results
+        )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(self._stack, results, state, preview)
+            self._frame = frame = compose(self._stack, results, state, preview, shape)
             self._shown_results = results
-            rough = self._painter.paint(frame, self._pointer, rested=rested)
+            rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
             for view in self._drawers:
                 view.draw(frame)
         else:
-            rough = self._painter.paint(frame, self._pointer, rested=rested)
+            rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
         return self._catch_up.pursue(state, results.get(state.method), rested) or rough
 
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:

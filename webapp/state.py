@@ -7,8 +7,10 @@ from photolin.analysis import METHODS, Method
 from photolin.errors import OptionError
 from photolin.factors import Factor, Thresholds
 
-Layer = Literal["input", "linearized", "residual", "labels"]
+Layer = Literal["input", "linearized", "residual", "labels", "albedo", "normals", "depth", "relit"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
+SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
+"""Layers that are there once a shape is."""
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
@@ -37,6 +39,12 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
+    relief: bool = False
+    """Lay the picture on the surface, and turn around it."""
+    arrows: bool = True
+    """Draw the lights beside the surface."""
+    light: tuple[float, float] = (-0.4, 0.5)
+    """x (right) and y (up) of the unit direction of the light of the layer relit."""
     pixel: tuple[int, int] | None = None
     """(row, column) of the selected pixel."""
     gain: float | None = None
@@ -56,6 +64,11 @@ class ViewState:
             raise OptionError(f"beside is {self.beside!r}; accepted are {', '.join(METHODS)}")
         if self.encoding not in ENCODINGS:
             raise OptionError(f"encoding is {self.encoding!r}; accepted are {'; '.join(ENCODINGS)}")
+        if not self.light[0] ** 2 + self.light[1] ** 2 < 1:
+            raise OptionError(
+                f"light is {self.light}; accepted are x and y of a direction towards the camera's "
+                "side, of length below 1"
+            )
         if not 0 <= self.opacity <= 1:
             raise OptionError(f"opacity is {self.opacity:g}; accepted is 0 to 1")
         if self.gain is not None and not 0 < self.gain < float("inf"):

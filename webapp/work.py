@@ -8,6 +8,9 @@ from functools import partial
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError
 from photolin.factors import Thresholds
+from photolin.shape.known import Known
+from photolin.shape.recover import Shape, recover_shape
+from photolin.shape.resolve import resolve_ambiguity
 
 from .downloads import Pack, make_download, relabel
 from .job import Job
@@ -33,6 +36,8 @@ class Desk:
     """Show the stage, and the fraction of it that is done."""
     send: Callable[[str, bytes], None]
     """Hand a file of that name to the browser."""
+    shaped: Callable[[], None]
+    """A shape was recovered."""
     tell: Callable[[Exception], None]
     """Say what went wrong."""
     refuse: Callable[[], None]
@@ -56,12 +61,18 @@ class Work:
             self._results[runs.result.options.method] = runs.result
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
+        self._shape: Shape | None = None
         self._job = Job(self._guarded, desk.changed)
 
     @property
     def results(self) -> dict[Method, Analysis]:
         """The latest result by each method; a new dictionary whenever one changes."""
         return self._results
+
+    @property
+    def shape(self) -> Shape | None:
+        """The latest shape."""
+        return self._shape
 
     def deliver(self, method: Method, result: Analysis) -> None:
         """Take a result that was made elsewhere."""
@@ -87,6 +98,17 @@ class Work:
     def download(self, kind: str, everything: bool) -> None:
         """Send files of what is on screen, see `downloads.make_download`."""
         self._begin(partial(self._send, self._desk.read(), kind, everything))
+
+    def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
+        """Recover the shape from the result on screen.
+
+        Args:
+            known: of the scene.
+            given_lights: whether the stack's own lights are used where `known` says nothing.
+            px_mm: side of a pixel, mm.
+        """
+        state = self._desk.read()
+        self._begin(partial(self._recover, state, known, given_lights, px_mm))
 
     def ensure(self, state: ViewState) -> None:
         """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
@@ -127,14 +149,40 @@ class Work:
             suggested = self._runs.suggest(self._desk.progress, self._job.stopping)
         self._desk.move(suggested)
 
-    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
+    def _settled(self, state: ViewState) -> Analysis:
+        """The result on screen; where that is a preview, a run for the same thresholds.
+
+        Raises:
+            OptionError: there is none yet.
+        """
         analysis = self._results.get(state.method)
         if analysis is None:
-            raise OptionError("there is no result to export yet; linearize first")
+            raise OptionError("there is no result yet; linearize first")
         if is_behind(state, analysis):
-            # what is on screen is a preview: files are of the whole, as a run would give them
             self._linearize(state.method, state.thresholds)
             analysis = self._results[state.method]
+        return analysis
+
+    def _recover(
+        self, state: ViewState, known: Known, given_lights: bool, px_mm: float | None
+    ) -> None:
+        analysis = self._settled(state)
+        self._desk.progress("shape", 0.0)
+        with cancelling("shape", "the earlier one is kept" if self._shape else "there is none"):
+            told = analysis if given_lights else replace(analysis, lights=None)
+            self._shape = recover_shape(
+                self._runs.stack,
+                analysis,
+                resolve_ambiguity(told, known),
+                px_mm=px_mm,
+                progress=self._desk.progress,
+                cancel=self._job.stopping,
+            )
+        self._desk.shaped()
+
+    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
+        # files are of the whole, as a run would give them, even while a preview is shown
+        analysis = self._settled(state)
         self._desk.progress("writing files", 0.5)
         shown = relabel(self._runs.stack, analysis, state.thresholds)
         self._desk.send(

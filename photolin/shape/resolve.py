@@ -1,64 +1,16 @@
 """The 3x3 ambiguity from whatever is known of a scene."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis import Analysis
-from ..errors import InputError, OptionError
+from ..errors import InputError
 from .integrability import resolve_by_integrability
+from .known import Known
 from .points import resolve_from_points
 from .resolved import Resolved
 from .some_lights import resolve_from_lights
 from .sphere import resolve_from_sphere, sphere_normals
-
-Sphere = tuple[float, float, float]
-"""Row and column of the centre and radius of an outline, pixels; whole at pixel centres."""
-Point = tuple[int, int]
-"""(row, column)"""
-Vector = tuple[float, float, float]
-"""x right, y up, z to the camera."""
-
-
-@dataclass(frozen=True)
-class Known:
-    """What someone knows of a scene besides its images; one kind of it is used."""
-
-    sphere: Sphere | None = None
-    """A sphere in the scene: all its pixels are used, or only `points` where some are given."""
-    points: tuple[Point, ...] = ()
-    """Pixels of known normal: those of `normals`, or of the sphere."""
-    normals: tuple[Vector, ...] = ()
-    """Unit normals of the points."""
-    images: tuple[int, ...] = ()
-    """Numbers of the images whose lights are known, from 0."""
-    lights: tuple[Vector, ...] = ()
-    """Their lights, towards the light."""
-    powers: bool = False
-    """Whether the lengths of `lights` are their powers, to a common unit."""
-
-    def __post_init__(self) -> None:
-        if self.lights and (self.points or self.sphere):
-            raise OptionError(
-                "lights and points or a sphere are known; one of them is accepted, to resolve "
-                "the ambiguity of unknown lights"
-            )
-        if self.normals and len(self.normals) != len(self.points):
-            raise OptionError(
-                f"{len(self.points)} points and {len(self.normals)} normals; "
-                "one normal for each point is accepted"
-            )
-        if self.normals and self.sphere:
-            raise OptionError("points have normals and a sphere; one of them is accepted")
-        if len(self.images) != len(self.lights):
-            raise OptionError(
-                f"{len(self.images)} images and {len(self.lights)} lights of them; "
-                "equal numbers are accepted"
-            )
-        if self.points and not (self.normals or self.sphere):
-            raise OptionError("points without normals; accepted with the sphere they lie on")
-
 
 NOTHING = Known()
 

@@ -10,7 +10,7 @@ from photolin.stack import ImageStack
 
 from ..frame import Frame
 from ..readout import escape
-from ..state import LAYERS, ViewState
+from ..state import LAYERS, SURFACE, Layer, ViewState
 from ..values import choose_option, clamp_integer
 from . import INDENT
 
@@ -42,11 +42,12 @@ class PictureView:
         self._buttons = gui.add_button_group(" ", (PREVIOUS, NEXT, FIT, ONE_TO_ONE))
         self._layer = gui.add_dropdown(
             "View",
-            LAYERS,
+            tuple(layer for layer in LAYERS if layer not in SURFACE),
             initial_value="input",
             hint="input: as photographed. linearized: diffuse reflection alone, signed, zero is "
             "mid-grey. residual: input minus linearized, zero is white. Both show labels only as "
-            "outlines. labels: the label map alone (keys: up and down arrow)",
+            "outlines. labels: the label map alone. Once a shape is there: its albedo, normals and "
+            "depth, and the scene under a light of your own (keys: up and down arrow)",
         )
         for handle in (self._image, self._layer):
 
@@ -65,14 +66,25 @@ class PictureView:
         async def _(_: viser.GuiEvent) -> None:
             actions[self._buttons.value]()
 
+    def offer(self, surface: bool) -> None:
+        """Offer the layers of a shape too, or not."""
+        layers = tuple(layer for layer in LAYERS if surface or layer not in SURFACE)
+        if self._layer.options != layers:
+            self._layer.options = layers
+
+    def show(self, layer: Layer) -> None:
+        """Go to a layer."""
+        self._layer.value = layer
+
     def step(self, by: int) -> None:
         """Go `by` images on, round the ends."""
         self._image.value = (self._read_image() + by) % self._count
 
     def turn(self, by: int) -> None:
         """Go `by` layers on, round the ends."""
-        at = LAYERS.index(choose_option(self._layer.value, LAYERS, "input"))
-        self._layer.value = LAYERS[(at + by) % len(LAYERS)]
+        layers = self._layer.options
+        at = layers.index(choose_option(self._layer.value, layers, "input"))
+        self._layer.value = layers[(at + by) % len(layers)]
 
     def read(self, state: ViewState) -> ViewState:
         """The state with image and layer as set here."""

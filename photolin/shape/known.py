@@ -1,0 +1,128 @@
+"""What a user knows of a scene: a sphere, points of known normal, lights of some images."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, OptionError
+from ..load.lights import read_table
+
+UNIT = 1e-3
+"""Difference of all lengths from 1 up to which lights are directions without powers."""
+
+Sphere = tuple[float, float, float]
+"""Row and column of the centre and radius of an outline, pixels; whole at pixel centres."""
+Point = tuple[int, int]
+"""(row, column)"""
+Vector = tuple[float, float, float]
+"""x right, y up, z to the camera."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What someone knows of a scene besides its images; one kind of it is used."""
+
+    sphere: Sphere | None = None
+    """A sphere in the scene: all its pixels are used, or only `points` where some are given."""
+    points: tuple[Point, ...] = ()
+    """Pixels of known normal: those of `normals`, or of the sphere."""
+    normals: tuple[Vector, ...] = ()
+    """Unit normals of the points."""
+    images: tuple[int, ...] = ()
+    """Numbers of the images whose lights are known, from 0."""
+    lights: tuple[Vector, ...] = ()
+    """Their lights, towards the light."""
+    powers: bool = False
+    """Whether the lengths of `lights` are their powers, to a common unit."""
+
+    def __post_init__(self) -> None:
+        if self.lights and (self.points or self.sphere):
+            raise OptionError(
+                "lights and points or a sphere are known; one of them is accepted, to resolve "
+                "the ambiguity of unknown lights"
+            )
+        if self.normals and len(self.normals) != len(self.points):
+            raise OptionError(
+                f"{len(self.points)} points and {len(self.normals)} normals; "
+                "one normal for each point is accepted"
+            )
+        if self.normals and self.sphere:
+            raise OptionError("points have normals and a sphere; one of them is accepted")
+        if len(self.images) != len(self.lights):
+            raise OptionError(
+                f"{len(self.images)} images and {len(self.lights)} lights of them; "
+                "equal numbers are accepted"
+            )
+        if self.points and not (self.normals or self.sphere):
+            raise OptionError("points without normals; accepted with the sphere they lie on")
+
+
+def read_known(
+    names: tuple[str, ...],
+    points: Path | None = None,
+    sphere: Sphere | None = None,
+    lights: Path | None = None,
+) -> Known:
+    """What files say is known of a scene.
+
+    Args:
+        names: of the images, to find those of `lights`.
+        points: lines ``row column x y z``, a pixel and its unit normal; or ``row column`` alone,
+            pixels of the sphere.
+        sphere: row and column of the centre and radius of its outline, pixels.
+        lights: lines ``name x y z``, as in .lp files, for some of the images. Lengths are powers
+            unless all are 1, or the file is .lp.
+
+    Raises:
+        InputError: names the file and what cannot be used in it.
+        OptionError: what does not go together, see `Known`.
+    """
+    if lights is not None:
+        images, vectors, powers = _read_some_lights(lights, names)
+        return Known(sphere, images=images, lights=vectors, powers=powers)
+    if points is None:
+        return Known(sphere)
+    pixels, normals = _read_points(points)
+    return Known(sphere, pixels, normals)
+
+
+def _read_points(path: Path) -> tuple[tuple[Point, ...], tuple[Vector, ...]]:
+    accepted = "lines of row column x y z, or of row column with the option sphere, are accepted"
+    try:
+        lines = [line.split("#")[0].split() for line in path.read_text("utf-8-sig").splitlines()]
+        table = np.array([[float(word) for word in line] for line in lines if line])
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:  # not text, no numbers, or lines of different lengths
+        raise InputError(f"{path}: is not a table of numbers; {accepted}") from error
+    if table.ndim != 2 or table.shape[1] not in (2, 5) or not np.isfinite(table).all():
+        raise InputError(f"{path}: does not hold points; {accepted}")
+    pixels = table[:, :2]
+    if (pixels != np.rint(pixels)).any() or (np.abs(pixels) > 1e6).any():
+        raise InputError(f"{path}: rows and columns are not whole; {accepted}")
+    return (
+        tuple((int(row), int(column)) for row, column in pixels),
+        tuple((x, y, z) for x, y, z in table[:, 2:].tolist()) if table.shape[1] == 5 else (),
+    )
+
+
+def _read_some_lights(
+    path: Path, names: tuple[str, ...]
+) -> tuple[tuple[int, ...], tuple[Vector, ...], bool]:
+    labels, vectors = read_table(path)
+    numbers = {name.lower(): k for k, name in enumerate(names)}
+    images = []
+    for label in labels:
+        name = label.replace("\\", "/").rsplit("/", 1)[-1].lower()
+        if name not in numbers:
+            raise InputError(
+                f"{path}: {label or 'a line without a name'!r} is no image of the stack; names "
+                f"such as {names[0]} before x y z are accepted"
+            )
+        images.append(numbers[name])
+    if path.suffix.lower() == ".lp":
+        powers = False
+    else:
+        powers = bool((np.abs(np.linalg.norm(vectors, axis=1) - 1) > UNIT).any())
+    return tuple(images), tuple((x, y, z) for x, y, z in vectors.tolist()), powers

@@ -1,0 +1,154 @@
+"""Verbs from linearized images to normals, depth and lights."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from tyro.conf import Positional
+
+from ..analysis import Analysis, Cancel, Options, Progress
+from ..console import progress_bar, stop_at_ctrl_c
+from ..errors import InputError
+from ..export import (
+    check_output,
+    is_result,
+    load_result,
+    load_result_source,
+    load_result_stack,
+    save_result,
+    write_files,
+)
+from ..export.shape import lights_files, shape_files
+from ..load import LoadOptions
+from ..pipeline import analyze
+from ..shape.chrome_ball import estimate_lights
+from ..shape.known import Sphere, read_known
+from ..shape.recover import Shape, recover_shape
+from ..shape.resolve import NOTHING, Known, resolve_ambiguity
+from ..stack import ImageStack
+from . import COMMAND, read_stack
+
+
+def shape(
+    path: Positional[Path],
+    out: Positional[Path],
+    analysis: Options = Options(),
+    reading: LoadOptions = LoadOptions(),
+    *,
+    points: Path | None = None,
+    sphere: Sphere | None = None,
+    some_lights: Path | None = None,
+    px_mm: float | None = None,
+    directx: bool = False,
+    threads: int | None = None,
+) -> None:
+    """Normals, albedo, depth, mesh and lights of a stack or a result, as files in OUT.
+
+    Without known lights, normals are known up to a 3x3 matrix. It is resolved by points of known
+    normal, a sphere in the scene, the lights of some images, or, with none of these, by what makes
+    the normals those of a surface, up to the stated convention. Space is x right, y up, z to the
+    camera.
+
+    Args:
+        path: What run accepts as stack, or a folder that run wrote.
+        out: Folder for the files; made when missing.
+        points: Text file of lines: row column x y z, a pixel and its unit normal. With sphere,
+            lines of row column alone are points of that sphere.
+        sphere: Row and column of the centre of a sphere in the scene and its radius, pixels.
+        some_lights: Lights of some of the images, lines of: name x y z.
+        px_mm: Side of a pixel, mm: depth and mesh are then in mm, else in pixels.
+        directx: Green of the normal map is y down (DirectX) instead of y up (OpenGL).
+        threads: Processors to use; all when left out. The result does not depend on it.
+    """
+    check_output(out)
+    stack_path = path
+    with progress_bar() as progress, stop_at_ctrl_c() as cancel:
+        if is_result(path):
+            result, images = load_result(path), load_result_stack(path)
+            was, reading = load_result_source(path)
+            stack_path = was or path
+        else:
+            images, seconds = read_stack(path, reading, progress)
+            result = analyze(images, analysis, threads=threads, progress=progress, cancel=cancel)
+            result = replace(result, seconds={"load": seconds, **result.seconds})
+        known = read_known(images.names, points, sphere, some_lights)
+        result, found = measure_shape(
+            images, result, known, px_mm=px_mm, threads=threads, progress=progress, cancel=cancel
+        )
+    save_result(
+        result,
+        out,
+        shape=found,
+        command=COMMAND.get(),
+        stack_path=stack_path,
+        load_options=reading,
+    )
+    files = shape_files(found, result.names, result.mask, directx=directx)
+    write_files(out, files)
+    print(f"{result.title}: {found.resolved.note}")
+    print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
+    print(f"written result.npz, report.json, {', '.join(files)} to {out}")
+
+
+def measure_shape(
+    stack: ImageStack,
+    analysis: Analysis,
+    known: Known = NOTHING,
+    *,
+    depth: bool = True,
+    px_mm: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> tuple[Analysis, Shape]:
+    """The analysis with the seconds of its shape among its own, and the shape."""
+    start = perf_counter()
+    found = recover_shape(
+        stack,
+        analysis,
+        resolve_ambiguity(analysis, known),
+        depth=depth,
+        px_mm=px_mm,
+        threads=threads,
+        progress=progress,
+        cancel=cancel,
+    )
+    took: Mapping[str, float] = analysis.seconds
+    seconds = perf_counter() - start
+    took = {**took, "shape": seconds, "total": took["total"] + seconds}
+    return replace(analysis, seconds=took), found
+
+
+def lights(
+    balls: Positional[Path],
+    out: Positional[Path],
+    reading: LoadOptions = LoadOptions(),
+) -> None:
+    """Light directions from images of a mirror ball: OUT/lights.lp and light_directions.txt.
+
+    Args:
+        balls: Images of the ball, one for each light, with a mask of its disc.
+        out: Folder for the files; made when missing.
+    """
+    check_output(out)
+    with progress_bar() as progress:
+        images, _ = read_stack(balls, reading, progress)
+    if images.mask.all():
+        raise InputError(f"{balls}: has no mask; mark the ball's disc with the option mask")
+    found = estimate_lights(images.images, images.mask)
+    for name, doubt in zip(images.names, found.doubts, strict=True):
+        if doubt:
+            print(f"warning: {name}: {doubt}")
+    if len(found.found) < len(images.names):
+        missing = np.setdiff1d(np.arange(len(images.names)), found.found)
+        raise InputError(
+            f"{balls}: image {images.names[missing[0]]} shows no spot on the ball; "
+            "take it out, or mark the ball better"
+        )
+    files = lights_files(found.directions, images.names)
+    write_files(out, files)
+    row, column = found.centre
+    print(f"ball: centre row {row:.1f}, column {column:.1f}, radius {found.radius:.1f} pixels")
+    print(f"written {', '.join(files)} to {out}")

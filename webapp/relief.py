@@ -1,0 +1,78 @@
+"""The surface in 3D: its mesh, which the page lays the picture on, and the lights as arrows.
+
+In viser's world the picture lies in the plane of x (right) and y (down), and the camera is at
+negative z; so a height towards the camera is a negative z there.
+"""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from photolin.shape.mesh import build_mesh
+
+from photolin.shape.recover import Shape
+
+from .ray import meet_relief, ray_in_text
+
+MESH, ARROWS = "/canvas/relief", "/canvas/lights"
+MOST_VERTICES = 150_000
+"""Of the mesh in the browser."""
+FAR, LONG = 0.62, 0.12
+"""Where arrows end and how long they are, in diagonals of the picture."""
+ARROW, CHOSEN = (250, 220, 90), (255, 120, 40)
+"""Colours of the lights, and of that of the image shown."""
+
+Pixel = tuple[int, int]
+"""(row, column)"""
+
+
+class Relief:
+    """The surface of one tab; empty until one is set."""
+
+    def __init__(self, client: viser.ClientHandle, height: int, width: int, world: float) -> None:
+        """For pictures of `height` rows and `width` columns, `world` high in viser's world."""
+        self._client, self._shape = client, (height, width)
+        self._pixel = world / height
+        self._depth: NDArray[np.float32] | None = None
+        self._handles: list[viser.SceneNodeHandle] = []
+
+    def set(self, shape: Shape | None) -> None:
+        """Show this surface in place of the earlier one; None removes it."""
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        self._depth = None if shape is None else shape.depth
+        if shape is None or shape.depth is None:
+            return
+        mesh = build_mesh(shape.depth, np.isfinite(shape.depth), most_vertices=MOST_VERTICES)
+        turned = mesh.vertices * np.float32([self._pixel, -self._pixel, -self._pixel])
+        self._handles.append(
+            self._client.scene.add_mesh_simple(
+                MESH, turned, mesh.faces, side="double", cast_shadow=False, receive_shadow=False
+            )
+        )
+
+    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
+        """Draw the lights as arrows towards the scene, that of image `chosen` in a colour."""
+        self._client.scene.remove_by_name(ARROWS)
+        if shape is None or not visible:
+            return
+        diagonal = float(np.hypot(*self._shape)) * self._pixel
+        towards = shape.lights / np.linalg.norm(shape.lights, axis=1, keepdims=True)
+        towards = towards * [1, -1, -1]
+        points = np.stack([towards * (FAR + LONG), towards * FAR], axis=1) * diagonal
+        colours = np.tile(np.uint8(ARROW), (len(points), 2, 1))
+        colours[chosen] = CHOSEN
+        size = 0.012 * diagonal
+        self._client.scene.add_arrows(
+            ARROWS,
+            points.astype(np.float32),
+            colours,
+            shaft_radius=size / 4,
+            head_radius=size,
+            head_length=2.5 * size,
+        )
+
+    def pixel_on(self, text: str) -> Pixel | None:
+        """The pixel of the surface that a ray meets, as the page wrote it; None beside it."""
+        ray = ray_in_text(text)
+        return None if ray is None or self._depth is None else meet_relief(self._depth, ray)
