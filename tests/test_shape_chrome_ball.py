@@ -160,6 +160,13 @@ def test_a_ball_that_mirrors_nothing_is_refused() -> None:
         estimate_lights(images * 0.1, mask)
 
 
+def test_a_slightly_oval_mask_is_accepted() -> None:
+    images, _ = mirror(sky())
+    row, column = np.indices(SHAPE)
+    oval = np.hypot((row - CENTRE[0]) / 0.95, column - CENTRE[1]) < RADIUS
+    assert errors(estimate_lights(images, oval), sky()).max() < 10
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_images_that_are_not_finite_on_the_ball_are_refused(value: float) -> None:
     images, mask = mirror(sky()[:3])
