@@ -26,6 +26,7 @@ def problem(seed: int, K: int = 30, N: int = 60) -> tuple[Known, np.ndarray]:
     X[wrong > 0.97] += 0.2
     X[12:, :4] = 0  # lit in few images
     white = np.where(np.arange(K) % 5, np.inf, 0.6).astype(np.float32)
+    white[0] = X[0, ::4] = 0.2  # exactly white, and dim enough to count if it were not
     known = (X.astype(np.float32), A, white, rng.uniform(0.8, 1.2, K), np.float32(0.03))
     return known, (truth * rng.uniform(0.9, 1.1, truth.shape)).T
 

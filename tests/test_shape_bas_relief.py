@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from photolin.shape.bas_relief import choose_relief, entropy, relief, weighted_median
+from photolin.shape.bas_relief import (
+    choose_relief,
+    entropy,
+    points_inward,
+    relief,
+    weighted_median,
+)
 from photolin.shape.directions import angles_between
 from photolin.shape.sphere import sphere_normals
 
@@ -89,6 +95,28 @@ def test_pixels_without_weight_do_not_matter() -> None:
     spoilt = np.where(weights[:, None] > 0, vectors, (0.2, -0.1, 0.3))
     expected = choose_relief(vectors, weights, None, USED, BALL)
     np.testing.assert_allclose(choose_relief(spoilt, weights, None, USED, BALL), expected)
+
+
+def test_what_nothing_decides_stays_where_normals_face_the_camera() -> None:
+    """The four sides of a pyramid have the same albedo under any stretch."""
+    sides = np.array([[0.8, 0, 1], [-0.8, 0, 1], [0, 0.8, 1], [0, -0.8, 1]])
+    sides += np.array([0.3, -0.2, 0])
+    pyramid = sides[np.arange(len(TRUE)) % 4]
+    chosen = choose_relief(pyramid, EVEN, None, USED, BALL)
+    slopes = np.abs((sides @ chosen.T)[:, :2]).max(axis=1)
+    np.testing.assert_allclose(slopes, 1, atol=0.1)
+
+
+def test_one_normal_for_the_most_part_divides_by_nothing() -> None:
+    ridge = np.where(np.arange(len(TRUE))[:, None] % 3, (0.1, 0.2, 1), (0.9, -0.4, 1))
+    assert np.isfinite(choose_relief(ridge, EVEN, None, USED, BALL)).all()
+
+
+def test_a_saddle_is_convex_where_it_bends_most() -> None:
+    everywhere = np.ones_like(BALL)
+    for factors in ((-0.3, 1, 1), (1, -0.3, 1)):
+        assert not points_inward(TRUE * factors, USED, everywhere)
+        assert points_inward(TRUE * factors * (-1, -1, 1), USED, everywhere)
 
 
 def test_entropy_is_that_of_the_smoothed_density_and_blind_to_scale() -> None:

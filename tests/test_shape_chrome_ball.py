@@ -150,6 +150,7 @@ def test_a_mask_a_little_too_large_or_ragged_is_accepted() -> None:
     images, mask = mirror(sky())
     ragged = mask.copy()
     ragged[:, ::5] &= np.roll(mask, 2, 0)[:, ::5]
+    ragged[100:105, 100:105] = False
     images[:, mask & ~ragged] = 1
     assert errors(estimate_lights(images, ragged), sky()).max() < 1.5
 
@@ -158,6 +159,13 @@ def test_a_ball_that_mirrors_nothing_is_refused() -> None:
     images, mask = mirror(sky())
     with pytest.raises(InputError, match="none of 8 images shows a bright spot on the ball at row"):
         estimate_lights(images * 0.1, mask)
+
+
+def test_a_slightly_oval_mask_is_accepted() -> None:
+    images, _ = mirror(sky())
+    row, column = np.indices(SHAPE)
+    oval = np.hypot((row - CENTRE[0]) / 0.95, column - CENTRE[1]) < RADIUS
+    assert errors(estimate_lights(images, oval), sky()).max() < 10
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -51,7 +51,7 @@ def test_only_edges_and_what_they_touch_are_left_out() -> None:
     bases = hill()
     bases[:, :, 50:] = hill(-40)[:, :, 50:]
     found = differentiate(bases, EVERY)
-    assert not found.used[:, 47:53].any()
+    assert not found.used[5:-5, 48:52].any()
     assert found.used[5:-5, 5:44].mean() > 0.95
     assert found.used[5:-5, 56:-5].mean() > 0.95
     plain = differentiate(hill(), EVERY)

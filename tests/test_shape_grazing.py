@@ -131,6 +131,17 @@ def test_unknown_pixels_stay_nan_and_those_outside_zero(
     assert (out[:, ~stack.mask] == 0).all()
 
 
+def test_pixels_lit_in_few_images_keep_theirs_to_the_bit(
+    uneven: tuple[ImageStack, Analysis, np.ndarray],
+) -> None:
+    stack, a, _ = uneven
+    images = stack.images.copy()
+    images[20:, 10:14] = 0
+    out = fit_grazing(replace(stack, images=images), a)
+    np.testing.assert_array_equal(out[:, 10:14], a.linearized_bases[:, 10:14])
+    assert (out[:, 14:30] != a.linearized_bases[:, 14:30]).any()
+
+
 # Laws
 
 

@@ -73,6 +73,15 @@ def test_paint_does_not_matter() -> None:
     assert resolved.residual < 0.02
 
 
+def test_noise_in_very_dark_paint_is_bearable() -> None:
+    paint = np.where(np.indices(SHAPE).sum(0) // 20 % 2, 0.05, 0.9)
+    bases, mask, normals = ball(paint)
+    bases += np.random.default_rng(0).normal(0, 0.01, bases.shape) * mask
+    matrix = resolve_by_integrability(bases, mask).matrix
+    light = mask & (paint > 0.5)
+    assert bas_relief_error(bases[:, light].T @ matrix.T, normals[light]) < 2
+
+
 @pytest.mark.parametrize(
     ("name", "relief", "even"),
     [("sphere_obstacles", 0.5, 2), ("sphere_cone", 0.5, 1), ("pot", 0.8, 4), ("cup", 1.5, 3)],
@@ -180,6 +189,10 @@ def test_flat_bent_and_random_surfaces_leave_it_open() -> None:
         for p, q in ((zero, zero + 0.2), (x, zero), (zero, np.sin(3 * y))):
             with pytest.raises(DegenerateError, match="plane"):
                 resolve_by_integrability(*surface(p, q, noise))
+    corner = np.where(x + y > 0, 0.8, np.where(x > y, -0.6, 0.1))
+    for noise in (0.0, 0.003):
+        with pytest.raises(DegenerateError, match="does not determine the lights"):
+            resolve_by_integrability(*surface(corner, corner**2, noise))
     with pytest.raises(DegenerateError, match="does not determine the lights"):
         resolve_by_integrability(*surface(x, 0.7 * y))
     noise = np.random.default_rng(0).normal(size=(3, *SHAPE))

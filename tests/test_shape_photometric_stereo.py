@@ -111,6 +111,13 @@ def test_a_stack_of_rank_two_or_one_has_no_factorization(kind: str) -> None:
         factorize_all(stack)
 
 
+def test_two_pixels_have_no_factorization(relief: tuple[ImageStack, np.ndarray]) -> None:
+    mask = np.zeros((24, 30), bool)
+    mask[3, 4:6] = True
+    with pytest.raises(DegenerateError, match="fewer than three independent parts"):
+        factorize_all(replace(relief[0], mask=mask))
+
+
 # D observations
 
 

@@ -82,7 +82,8 @@ def face_camera(vectors: Floats, weights: Floats) -> Floats:
     seen = vectors[:, 2] > 1e-3 * np.linalg.norm(vectors, axis=1)
     slopes, w = -vectors[seen, :2] / vectors[seen, 2:], weights[seen]
     p, q = weighted_median(slopes[:, 0], w), weighted_median(slopes[:, 1], w)
-    slope = weighted_median(np.hypot(*(slopes - (p, q)).T), w)
+    # where most normals are one, there is no usual slope
+    slope = weighted_median(np.hypot(*(slopes - (p, q)).T), w) or 1.0
     return np.array([[1 / slope, 0, p / slope], [0, 1 / slope, q / slope], [0, 0, 1]])
 
 

@@ -1,6 +1,7 @@
 """From normals to depth."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,8 @@ from .multigrid import solve_laplace
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-GRAZING = 0.02
-"""Least z of a unit normal: slopes end at 50, also of normals that face away from the camera."""
+GRAZING = 0.005
+"""Least z of a unit normal: slopes end at 200, also of normals that face away from the camera."""
 SHARPNESS = 2.0
 """k of Cao et al.: how fast a pixel lets go of the neighbour with the larger jump."""
 LOOSE = 1e-4
@@ -67,7 +68,7 @@ def integrate_normals(
 
     Args:
         normals: (H,W,3) of any length, x right, y up, z to the camera. NaN or 0 where undetermined.
-            Those with z below 0.02, or facing away, are taken as grazing.
+            Those with z below 0.005, or facing away, are taken as grazing.
         mask: (H,W) bool, the pixels of the object.
         weights: (H,W) confidence in each normal, any scale; 0 is undetermined. Even if left out.
 
@@ -126,16 +127,17 @@ def _bridge(unit: Floats, known: Flags, mask: Flags, confidence: Floats) -> tupl
     confidence = np.where(known, confidence / confidence[known].max(), 0)
     if not (mask & ~known).any():
         return unit, confidence
-    distance, nearest = distance_transform_edt(~known, return_indices=True)
+    found = distance_transform_edt(~known, return_indices=True)
+    distance, (row, column) = cast(tuple[Floats, NDArray[np.int32]], found)
     gap = mask & ~known & (distance <= REACH)
-    confidence[gap] = BRIDGE * confidence[tuple(nearest)][gap]
-    return unit[tuple(nearest)], confidence
+    confidence[gap] = BRIDGE * confidence[row, column][gap]
+    return unit[row, column], confidence
 
 
 def _steps(unit: Floats, confidence: Floats, along: int) -> Steps:
     """Pairs along the last axis; depth rises by -n[along] / nz from a pixel to the next."""
     up = np.maximum(unit[:, :, 2], GRAZING)
-    weight, scale, slope = np.zeros((3, *confidence.shape))
+    weight, scale, slope = (np.zeros(confidence.shape) for _ in range(3))
     weight[:, :-1] = np.sqrt(confidence[:, 1:] * confidence[:, :-1])
     scale[:, :-1] = (up[:, 1:] + up[:, :-1]) / 2
     slope[:, :-1] = -(unit[:, 1:, along] + unit[:, :-1, along]) / (up[:, 1:] + up[:, :-1])
@@ -180,7 +182,7 @@ def _pull(flow: Floats) -> Floats:
 
 def _hold(z: Floats, steps: Steps) -> Floats:
     """How far the two pixels of each pair hold on to each other: 1 where nothing jumps."""
-    jump, before = np.zeros((2, *z.shape))
+    jump, before = np.zeros_like(z), np.zeros_like(z)
     jump[:, :-1] = np.square(steps.scale * (np.roll(z, -1, axis=1) - z))[:, :-1]
     jump *= steps.weight > 0
     before[:, 1:] = jump[:, :-1]
@@ -195,7 +197,9 @@ def _centre(z: Floats, known: Flags, joined: Flags) -> Floats:
     """Depth of the known pixels, in raster order, less its mean over each joined part."""
     from scipy.ndimage import label
 
-    part = np.asarray(label(joined)[0])[known]
+    parts = np.zeros(joined.shape, np.int32)
+    label(joined, output=parts)
+    part = parts[known]
     values = z[known]
     count = np.maximum(np.bincount(part), 1)
     return values - (np.bincount(part, values) / count)[part]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
+from scipy.ndimage import binary_erosion, gaussian_filter
 
 from ..errors import DegenerateError
 from .directions import SINGULAR, Floats, normalize, spread_evenly
@@ -14,13 +14,11 @@ SMOOTH = 1.5
 STEEP, USUAL = 4.0, 0.8
 """A neighbour is beyond an edge when the direction turns by more than STEEP times what the share
 USUAL of all neighbours turns at most."""
-DARK = 0.1
+DARK = 0.3
 """Share of the median albedo below which a pixel has less weight in the smoothing."""
 NOISE = 0.3
 """Least spread of the smoothed directions in each dimension, 0.58 where they spread evenly: noise
 alone, which whitening lifts as high, is smoothed to 0.11."""
-COVERED = 0.8
-"""Share of the smoothing's weight that must lie on the same side of all edges."""
 MIN_PIXELS = 100
 
 
@@ -66,9 +64,9 @@ def differentiate(bases: NDArray[np.floating], known: NDArray[np.bool_]) -> Deri
     whitening = spread_evenly(normalize(values), SINGULAR)
     field = np.zeros(bases.shape)
     field[:, known] = divide_albedo(values @ whitening.T).T
-    smooth = known & ~binary_dilation(find_edges(field, known), np.ones((3, 3))).astype(bool)
-    field, share = blur(field, smooth, SMOOTH)
-    used = binary_erosion(smooth & (share > COVERED), np.ones((3, 3))).astype(bool)
+    smooth = known & ~find_edges(field, known)
+    field = blur(field, smooth, SMOOTH)
+    used = binary_erosion(smooth, np.ones((3, 3))).astype(bool)
     if used.sum() < MIN_PIXELS:
         raise DegenerateError(
             f"{used.sum()} pixels lie away from outlines and edges; integrability needs at least "
@@ -97,7 +95,7 @@ def divide_albedo(vectors: Floats) -> Floats:
 
 def find_edges(field: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(H,W) pixels on either side of a jump of the direction of `field` (3,H,W)."""
-    calm, _ = blur(field, known, 1.0)
+    calm = blur(field, known, 1.0)
     unit = calm / np.maximum(np.linalg.norm(calm, axis=0), np.finfo(float).tiny)
     edges = np.zeros(known.shape, bool)
     pairs = [(np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:, :], np.s_[:-1, :])]
@@ -112,8 +110,8 @@ def find_edges(field: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return edges
 
 
-def blur(field: Floats, where: NDArray[np.bool_], sigma: float) -> tuple[Floats, Floats]:
-    """Gaussian mean of `field` (3,H,W) over the pixels `where`, and the share of weight there."""
+def blur(field: Floats, where: NDArray[np.bool_], sigma: float) -> Floats:
+    """Gaussian mean of `field` (3,H,W) over the pixels `where`."""
     share = gaussian_filter(where.astype(float), sigma)
     total = np.stack([gaussian_filter(np.where(where, plane, 0.0), sigma) for plane in field])
-    return total / np.maximum(share, np.finfo(float).tiny), share
+    return total / np.maximum(share, np.finfo(float).tiny)

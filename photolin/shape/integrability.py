@@ -91,8 +91,8 @@ def conditions(smooth: Derivatives) -> Floats:
 def solve_robustly(system: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """u (3,), v (3,), how much each row is trusted (N,), and how curved the surface is there (N,).
 
-    A row's length is the curvature; where that is much smaller than is typical it is mostly noise
-    and counts less. All others count alike, whatever their curvature, unless they do not fit.
+    A row's length is the curvature; where that is much smaller than is typical, as in a plane,
+    a pixel says little of the surface's shape and counts less.
 
     Raises:
         DegenerateError: the rows do not determine u and v.
@@ -102,14 +102,13 @@ def solve_robustly(system: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         raise DegenerateError(FLAT_MESSAGE)
     typical = np.sqrt(weighted_median(length**2, length**2))
     weights = length / np.hypot(length, typical)
-    rows = system / np.hypot(length, typical)[:, None]
-    trust = np.ones(len(rows))
-    values, vectors = np.linalg.eigh(rows.T @ rows)
+    trust = np.ones(len(system))
+    values, vectors = np.linalg.eigh(system.T @ system)
     for _ in range(ROUNDS):
-        misfit = np.abs(rows @ vectors[:, 0])
+        misfit = np.abs(system @ vectors[:, 0])
         scale = max(weighted_median(misfit, weights**2), 1e-6)
         trust = 1 / (1 + (misfit / (PULL * scale)) ** 2) ** 2
-        values, vectors = np.linalg.eigh((rows * trust[:, None]).T @ rows)
+        values, vectors = np.linalg.eigh((system * trust[:, None]).T @ system)
     if values[0] > UNCLEAR * values[1] or values[1] < FLAT * values[5]:
         raise DegenerateError(FLAT_MESSAGE)
     return vectors[:3, 0], vectors[3:, 0], trust, weights

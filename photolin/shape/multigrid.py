@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..blocks import run_blocks
+from ..kernels.laplace import residual_rows, smooth_rows
+
 Floats = NDArray[np.floating]
 
-COARSEST = 8
+COARSEST = 4
 """Rows and columns that are solved outright."""
 SMOOTH = (0.35, 2.0)
 """Eigenvalues of the scaled matrix, at most 2, that smoothing damps; coarser grids do the rest."""
@@ -16,6 +19,8 @@ DEGREE = 3
 """Steps of smoothing before and after the coarser grids."""
 LIMIT = 200
 """Most steps of conjugate gradients."""
+BLOCK = 2**17
+"""Pixels in one piece of work for a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,19 +31,35 @@ class Grid:
     """(H,W) weights of each pixel and the next in its row; 0 in the last column."""
     down: Floats
     """(H,W) weights of each pixel and the one below; 0 in the last row."""
-    diagonal: Floats
-    """(H,W)"""
     inverse: Floats
     """(H,W) 1 / diagonal; 0 where a pixel has no neighbour."""
 
-    def times(self, z: Floats) -> Floats:
-        """A z, (H,W)."""
-        out = self.diagonal * z
-        out[:, :-1] -= self.right[:, :-1] * z[:, 1:]
-        out[:, 1:] -= self.right[:, :-1] * z[:, :-1]
-        out[:-1] -= self.down[:-1] * z[1:]
-        out[1:] -= self.down[:-1] * z[:-1]
+    def residual(self, given: Floats, z: Floats) -> Floats:
+        """given - A z, (H,W)."""
+        out = np.empty_like(z)
+        self._work(lambda *rows: residual_rows(self.right, self.down, given, z, out, *rows))
         return out
+
+    def smooth(self, given: Floats, z: Floats) -> Floats:
+        """z nearer to A^-1 given, by Chebyshev iteration.
+
+        Saad, Iterative methods for sparse linear systems, 2003, algorithm 12.1.
+        """
+        low, high = SMOOTH
+        middle, half = np.float32(high + low) / 2, np.float32(high - low) / 2
+        keep, take, ratio = np.float32(0), 1 / middle, half / middle
+        step = np.zeros_like(z)
+        for _ in range(DEGREE):
+            out = np.empty_like(z)
+            args = self.right, self.down, self.inverse, given, z, keep, take, step, out
+            self._work(lambda *rows, args=args: smooth_rows(*args, *rows))
+            new = 1 / (2 * middle / half - ratio)
+            keep, take, ratio, z = new * ratio, 2 * new / half, new, out
+        return z
+
+    def _work(self, work: Callable[[int, int], None]) -> None:
+        H, W = self.right.shape
+        run_blocks(work, H, max(BLOCK // W, 1))
 
 
 def solve_laplace(
@@ -65,21 +86,22 @@ def solve_laplace(
     Returns:
         (H,W); the best found after LIMIT steps where the tolerance is not reached.
     """
-    grid = _grid(right, down)
-    coarser, last = _coarsen(right.astype(np.float32), down.astype(np.float32))
-    z, rest = start, given - grid.times(start)
+    grid = _grid(right.astype(np.float64), down.astype(np.float64))
+    grids, last = _coarsen(right.astype(np.float32), down.astype(np.float32))
+    z = start.astype(np.float64)
+    rest = grid.residual(given, z)
     enough = tolerance**2 * (given * given).sum()
-    step, before = np.zeros_like(z), np.inf
+    nothing, step, before = np.zeros_like(z), np.zeros_like(z), np.inf
     for _ in range(LIMIT):
         check()
         if (rest * rest).sum() <= enough:
             break
-        guess = _cycle(coarser, last, rest.astype(np.float32)).astype(np.float64)
+        guess = _cycle(grids, last, rest.astype(np.float32)).astype(np.float64)
         now = (rest * guess).sum()
         step = guess + now / before * step
-        image = grid.times(step)
-        length = now / (step * image).sum()
-        z, rest, before = z + length * step, rest - length * image, now
+        change = grid.residual(nothing, step)
+        length = -now / (step * change).sum()
+        z, rest, before = z + length * step, rest + length * change, now
     return z
 
 
@@ -88,7 +110,7 @@ def _grid(right: Floats, down: Floats) -> Grid:
     diagonal[:, 1:] += right[:, :-1]
     diagonal[1:] += down[:-1]
     inverse = np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)
-    return Grid(right, down, diagonal, inverse)
+    return Grid(np.ascontiguousarray(right), np.ascontiguousarray(down), inverse)
 
 
 def _coarsen(right: Floats, down: Floats) -> tuple[list[Grid], Floats]:
@@ -102,10 +124,11 @@ def _coarsen(right: Floats, down: Floats) -> tuple[list[Grid], Floats]:
         r, d = _pad(right), _pad(down)
         right, down = (r[::2, 1::2] + r[1::2, 1::2]) / 2, (d[1::2, ::2] + d[1::2, 1::2]) / 2
         grids.append(_grid(right, down))
-    units = np.eye(right.size, dtype=np.float64).reshape(-1, *right.shape)
-    matrix = np.stack([grids[-1].times(unit).ravel() for unit in units])
+    units = np.eye(right.size, dtype=np.float32).reshape(-1, *right.shape)
+    matrix = -np.stack([grids[-1].residual(0 * unit, unit).ravel() for unit in units])
     # constants, which have the eigenvalue 0, are left out
-    return grids, np.linalg.pinv(matrix, rcond=1e-7, hermitian=True).astype(np.float32)
+    inverse = np.linalg.pinv(matrix.astype(np.float64), rcond=1e-6, hermitian=True)
+    return grids, inverse.astype(np.float32)
 
 
 def _cycle(grids: list[Grid], last: Floats, rest: Floats) -> Floats:
@@ -113,28 +136,13 @@ def _cycle(grids: list[Grid], last: Floats, rest: Floats) -> Floats:
     if len(grids) == 1:
         return (last @ rest.ravel()).reshape(rest.shape)
     grid = grids[0]
-    z = _smooth(grid, rest, np.zeros_like(rest))
-    left = _pad(rest - grid.times(z))
+    z = grid.smooth(rest, np.zeros_like(rest))
+    left = _pad(grid.residual(rest, z))
     blocks = left[::2, ::2] + left[1::2, ::2] + left[::2, 1::2] + left[1::2, 1::2]
     coarse = _cycle(grids[1:], last, blocks)
     H, W = rest.shape
     z += coarse.repeat(2, axis=0).repeat(2, axis=1)[:H, :W]
-    return _smooth(grid, rest, z)
-
-
-def _smooth(grid: Grid, given: Floats, z: Floats) -> Floats:
-    """Chebyshev iteration (Saad, Iterative methods for sparse linear systems, 2003, alg. 12.1)."""
-    low, high = SMOOTH
-    middle, half = (high + low) / 2, (high - low) / 2
-    ratio = half / middle
-    step = grid.inverse * (given - grid.times(z)) / np.float32(middle)
-    z = z + step
-    for _ in range(DEGREE - 1):
-        new = 1 / (2 * middle / half - ratio)
-        change = grid.inverse * (given - grid.times(z))
-        step = np.float32(new * ratio) * step + np.float32(2 * new / half) * change
-        z, ratio = z + step, new
-    return z
+    return grid.smooth(rest, z)
 
 
 def _pad(values: Floats) -> Floats:

@@ -58,7 +58,7 @@ def factorize_all(stack: ImageStack) -> tuple[NDArray[np.float32], NDArray[np.fl
     with threadpool_limits(1, "blas"):
         values, vectors = np.linalg.eigh(X @ X.T)
     sizes = np.sqrt(np.maximum(values[:-4:-1], 0))
-    if not (len(stack.pixels) >= 3 and sizes[2] > PLANE * sizes[0]):
+    if not sizes[2] > PLANE * sizes[0]:
         raise DegenerateError(
             f"{stack.title}: the observations have fewer than three independent parts; "
             "lights and surfaces that are spread in space are accepted"
