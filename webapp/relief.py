@@ -7,6 +7,7 @@ negative z; so a height towards the camera is a negative z there.
 import numpy as np
 import viser
 from numpy.typing import NDArray
+from photolin.errors import DegenerateError
 from photolin.shape.mesh import build_mesh
 
 from photolin.shape.recover import Shape
@@ -16,7 +17,7 @@ from .ray import meet_relief, ray_in_text
 MESH, ARROWS = "/canvas/relief", "/canvas/lights"
 MOST_VERTICES = 150_000
 """Of the mesh in the browser."""
-FAR, LONG = 0.62, 0.12
+FAR, LONG = 0.36, 0.1
 """Where arrows end and how long they are, in diagonals of the picture."""
 ARROW, CHOSEN = (250, 220, 90), (255, 120, 40)
 """Colours of the lights, and of that of the image shown."""
@@ -43,8 +44,12 @@ class Relief:
         self._depth = None if shape is None else shape.depth
         if shape is None or shape.depth is None:
             return
-        mesh = build_mesh(shape.depth, np.isfinite(shape.depth), most_vertices=MOST_VERTICES)
-        turned = mesh.vertices * np.float32([self._pixel, -self._pixel, -self._pixel])
+        known = np.isfinite(shape.depth)
+        try:
+            mesh = build_mesh(shape.depth, known, most_vertices=MOST_VERTICES)
+        except DegenerateError:  # single pixels: nothing to lay a picture on
+            return
+        turned = mesh.vertices * (np.array([1, -1, -1], np.float32) * np.float32(self._pixel))
         self._handles.append(
             self._client.scene.add_mesh_simple(
                 MESH, turned, mesh.faces, side="double", cast_shadow=False, receive_shadow=False
@@ -60,7 +65,7 @@ class Relief:
         towards = shape.lights / np.linalg.norm(shape.lights, axis=1, keepdims=True)
         towards = towards * [1, -1, -1]
         points = np.stack([towards * (FAR + LONG), towards * FAR], axis=1) * diagonal
-        colours = np.tile(np.uint8(ARROW), (len(points), 2, 1))
+        colours = np.tile(np.array(ARROW, np.uint8), (len(points), 1))
         colours[chosen] = CHOSEN
         size = 0.012 * diagonal
         self._client.scene.add_arrows(

@@ -101,7 +101,7 @@ class Session:
                 self._legend = LegendView(gui, self._stack, changed)
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
-        with tabs.add_tab("Shape", viser.Icon.STACK_3D):
+        with tabs.add_tab("Shape", viser.Icon.CUBE):
             self._shape_view = ShapeView(gui, self._stack, changed, self._recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self._export = ExportView(gui, self._work.download)

@@ -150,7 +150,7 @@ def load_shape(path: str | Path) -> Shape | None:
         normals, albedo, depth = arrays["normals"], arrays["albedo"], arrays.get("depth")
         normals[unknown] = albedo[unknown] = np.nan
         if depth is not None and told["px_mm"] is not None:
-            depth = depth / np.float32(told["px_mm"])
+            depth = (depth / np.float32(told["px_mm"])).astype(np.float32)
         resolved = restore_resolved(told)
         return Shape(normals, albedo, depth, arrays["lights"], resolved, told["px_mm"])
     except (KeyError, TypeError, ValueError, PhotolinError) as error:

@@ -25,4 +25,4 @@ def relight(shape: Shape, light: tuple[float, float, float]) -> NDArray[np.float
     s = np.array(light, np.float32)
     if s.shape != (3,) or not np.isfinite(s).all() or not s.any():
         raise OptionError(f"the light is {light}; x y z, not all zero, is accepted")
-    return shape.albedo * (shape.normals @ s)
+    return (shape.albedo * (shape.normals @ s)).astype(np.float32)

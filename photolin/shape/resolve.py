@@ -41,7 +41,7 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
     if analysis.lights is not None:
         every = np.arange(len(analysis.lights))
         return resolve_from_lights(analysis.coefficients, every, analysis.lights, powers=True)
-    return resolve_by_integrability(bases, mask)
+    return resolve_by_integrability(bases, mask, analysis.coefficients)
 
 
 def _on_sphere(known: Known, shape: tuple[int, int]) -> NDArray[np.float64]:

@@ -84,7 +84,7 @@ class ShapeView:
         )
         self._button = gui.add_button(
             "Recover shape",
-            icon=viser.Icon.STACK_3D,
+            icon=viser.Icon.CUBE,
             hint="Normals, albedo and depth from the linearized images (key: N)",
         )
         self._note = gui.add_html("")
