@@ -1,4 +1,4 @@
-"""Every file a user takes away: results, label maps, masks, linearized images."""
+"""Every file a user takes away: results, label maps, masks, linearized images, surfaces."""
 
 from .files import (
     CONTENTS,
@@ -22,6 +22,7 @@ from .result import (
     result_npz,
     save_result,
 )
+from .shape import shape_files
 
 __all__ = [
     "CONTENTS",
@@ -40,6 +41,7 @@ __all__ = [
     "result_npz",
     "safe_name",
     "save_result",
+    "shape_files",
     "write_files",
     "zip_files",
 ]
