@@ -1,4 +1,4 @@
-"""Every file a user takes away: results, label maps, masks, linearized images."""
+"""Every file a user takes away: results, label maps, masks, linearized images, surfaces."""
 
 from .arrays import result_npz
 from .files import (
@@ -23,6 +23,7 @@ from .result import (
     result_files,
     save_result,
 )
+from .shape import shape_files
 
 __all__ = [
     "CONTENTS",
@@ -42,6 +43,7 @@ __all__ = [
     "result_npz",
     "safe_name",
     "save_result",
+    "shape_files",
     "write_files",
     "zip_files",
 ]
