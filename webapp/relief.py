@@ -7,9 +7,9 @@ negative z; so a height towards the camera is a negative z there.
 import numpy as np
 import viser
 from numpy.typing import NDArray
+
 from photolin.errors import DegenerateError
 from photolin.shape.mesh import build_mesh
-
 from photolin.shape.recover import Shape
 
 from .ray import meet_relief, ray_in_text

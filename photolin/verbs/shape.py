@@ -6,11 +6,12 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 from tyro.conf import Positional
 
 from ..analysis import Analysis, Cancel, Options, Progress
 from ..console import progress_bar, stop_at_ctrl_c
-from ..errors import InputError
+from ..errors import DegenerateError, InputError
 from ..export import (
     check_output,
     is_result,
@@ -20,12 +21,15 @@ from ..export import (
     save_result,
     write_files,
 )
-def lights_files(*a): return {}
-def shape_files(*a,**k): return {}
-from ..load import LoadOptions
+from ..export.lights import lights_diligent, lights_lp
+from ..export.maps import Convention
+from ..export.shape import shape_files
+from ..load import LoadOptions, load_channels
 from ..pipeline import analyze
 from ..shape.chrome_ball import estimate_lights
+from ..shape.colour import colour_albedo
 from ..shape.known import Sphere, read_known
+from ..shape.mesh import build_mesh
 from ..shape.recover import Shape, recover_shape
 from ..shape.resolve import NOTHING, Known, resolve_ambiguity
 from ..stack import ImageStack
@@ -78,6 +82,7 @@ def shape(
         result, found = measure_shape(
             images, result, known, px_mm=px_mm, threads=threads, progress=progress, cancel=cancel
         )
+        colour = measure_colour(stack_path, reading, result, found, progress)
     save_result(
         result,
         out,
@@ -86,7 +91,7 @@ def shape(
         stack_path=stack_path,
         load_options=reading,
     )
-    files = shape_files(found, result.names, result.mask, directx=directx)
+    files = describe_surface(found, result, colour, convention="directx" if directx else "opengl")
     write_files(out, files)
     print(f"{result.title}: {found.resolved.note}")
     print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
@@ -122,6 +127,47 @@ def measure_shape(
     return replace(analysis, seconds=took), found
 
 
+def measure_colour(
+    path: Path, reading: LoadOptions, analysis: Analysis, found: Shape, progress: Progress
+) -> NDArray[np.float32] | None:
+    """Albedo (H,W,3) of a colour stack; None where the images are gray or arrays."""
+    try:
+        channels = load_channels(path, reading, progress)
+        planes = [
+            colour_albedo(found.normals, found.lights, analysis.labels, each.images, each.white)
+            for each in channels
+        ]
+    except InputError:
+        return None
+    return np.stack(planes, axis=2)
+
+
+def describe_surface(
+    found: Shape,
+    analysis: Analysis,
+    colour: NDArray[np.float32] | None = None,
+    convention: Convention = "opengl",
+) -> dict[str, bytes]:
+    """Every file of a shape, name to bytes; albedo is `colour` (H,W,3) where there is one."""
+    mesh = None
+    if found.depth is not None:
+        try:
+            mesh = build_mesh(found.depth, analysis.mask, found.px_mm or 1.0)
+        except DegenerateError:  # single pixels
+            mesh = None
+    return shape_files(
+        analysis.mask,
+        normals=found.normals,
+        albedo=found.albedo if colour is None else colour,
+        depth=found.depth,
+        mesh=mesh,
+        lights=found.lights,
+        names=analysis.names,
+        px_mm=found.px_mm,
+        convention=convention,
+    )
+
+
 def lights(
     balls: Positional[Path],
     out: Positional[Path],
@@ -148,7 +194,8 @@ def lights(
             f"{balls}: image {images.names[missing[0]]} shows no spot on the ball; "
             "take it out, or mark the ball better"
         )
-    files = lights_files(found.directions, images.names)
+    files = {"lights.lp": lights_lp(found.directions, images.names)}
+    files |= lights_diligent(found.directions)
     write_files(out, files)
     row, column = found.centre
     print(f"ball: centre row {row:.1f}, column {column:.1f}, radius {found.radius:.1f} pixels")
