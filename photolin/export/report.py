@@ -150,9 +150,9 @@ def restore_resolved(entry: dict[str, Any]) -> Resolved:
 
 def restore_scale(entry: dict[str, Any]) -> float | None:
     """mm per pixel as `describe_shape` wrote it; OptionError where no pixel has that."""
-    px_mm = None if entry["px_mm"] is None else float(entry["px_mm"])
+    px_mm = entry["px_mm"]
     check_scale(px_mm)
-    return px_mm
+    return None if px_mm is None else float(px_mm)
 
 
 def describe_reading(options: LoadOptions) -> dict[str, Any]:
