@@ -146,6 +146,20 @@ def test_progress_names_its_stages_and_ends_at_one() -> None:
     assert all(0 <= fraction <= 1 for _, fraction in told)
 
 
+def test_observations_are_weighed_by_the_powers_of_the_lights_found(monkeypatch) -> None:
+    """A dim light grazes no less for being dim: powers must reach the choice of observations."""
+    stack, analysis, truth = known()
+    told: list[np.ndarray] = []
+
+    def note(stack, analysis, powers, **_) -> np.ndarray:
+        told.append(powers)
+        return analysis.linearized_bases
+
+    monkeypatch.setattr("photolin.shape.recover.fit_grazing", note)
+    recover_shape(stack, analysis, resolve_ambiguity(analysis), depth=False)
+    np.testing.assert_allclose(told[0], truth.power, rtol=1e-6)
+
+
 # Degenerate and hostile
 
 
