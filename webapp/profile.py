@@ -117,7 +117,7 @@ def tabulate_pixel(
         rule = escape(rule_of(i, l, thresholds))
         rows.append(
             f'<tr{here} title="{escape(names[k])}"><td>{k}</td><td>{i:.3f}</td><td>{linear}</td>'
-            f'<td>{share}</td><td style="color:{_colour(label)};font-weight:600">'
+            f'<td>{share}</td><td style="color:{_colour(label)};font-weight:600;padding:0 6px">'
             f'{LETTERS[Factor(label)]}</td><td style="text-align:left">{rule}</td></tr>'
         )
     heads = ("image", "i", "l", "|i-l|/i", "", "rule")

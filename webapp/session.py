@@ -27,6 +27,7 @@ from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
 from .state import MOST_PINS, SURFACE, ViewState
+from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
 from .views.help import HelpView
@@ -105,6 +106,8 @@ class Session:
                 self._summary = SummaryView(gui)
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)
+        with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
+            self._compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self._shape_view = ShapeView(gui, self._stack, changed, self._recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
@@ -112,8 +115,10 @@ class Session:
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self._picture, self._thresholds, self._pixel_view)
-        self._readers = (self._run, *both, self._legend, self._shape_view)
-        self._drawers = (*(*both, self._shares, self._summary, self._diagnosis, self._shape_view),)
+        self._readers = (self._run, *both, self._legend, self._compare, self._shape_view)
+        self._drawers = (
+            *(*both, self._shares, self._summary, self._diagnosis, self._compare, self._shape_view),
+        )
         self._keys = self._bind_keys()
         canvas.on_pick(self._pick)
         canvas.on_hover(self._point)
@@ -185,6 +190,7 @@ class Session:
             "s": self._work.suggest,
             "e": lambda: self._work.download(*self._export.chosen()),
             "p": self._pin,
+            "b": self._compare.flicker,
             "x": partial(self._diagnosis.next, Factor.SPECULAR),
             "u": partial(self._diagnosis.next, Factor.UNDEFINED),
             "n": self._recover,

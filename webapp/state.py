@@ -41,6 +41,12 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
+    against: Layer | None = None
+    """The layer, by the method beside where one is, that the picture is compared with."""
+    divider: float = 0.5
+    """Share of the width at which the compared picture begins, 0 to 1."""
+    difference: bool = False
+    """Show the difference of both in place of their parts."""
     relief: bool = False
     """Lay the picture on the surface, and turn around it."""
     arrows: bool = True
@@ -73,6 +79,10 @@ class ViewState:
                 f"light is {self.light}; accepted are x and y of a direction towards the camera's "
                 "side, of length below 1"
             )
+        if self.against is not None and self.against not in LAYERS:
+            raise OptionError(f"against is {self.against!r}; accepted are {', '.join(LAYERS)}")
+        if not 0 <= self.divider <= 1:
+            raise OptionError(f"divider is {self.divider:g}; accepted is 0 to 1")
         if len(self.pins) > MOST_PINS or len(set(self.pins)) < len(self.pins):
             raise OptionError(f"pins are {self.pins}; accepted are {MOST_PINS} different pixels")
         if not 0 <= self.opacity <= 1:
