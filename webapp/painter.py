@@ -38,7 +38,13 @@ class Painter:
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
-        self._drawn: dict[str, object] = {}
+        self._drawn: dict[str, object] = {
+            "marks": ((),),
+            "orbit": (False,),
+            "arrows": (None, 0),
+            "light": (None,),
+        }
+        """The key by which each part was drawn; at first, what an empty canvas shows."""
         self._legend = ""
         self._rough = False
         self._encoded: dict[tuple[object, ...], tuple[bytes, str]] = {}
@@ -117,8 +123,9 @@ class Painter:
             self._canvas.set_surface(shape)
         if self._is_new("orbit", turning):
             self._canvas.set_orbit(turning)
-        if self._is_new("arrows", shape, state.image, turning and state.arrows):
-            self._canvas.set_arrows(shape, state.image, turning and state.arrows)
+        arrows = (shape, state.image) if turning and state.arrows else (None, 0)
+        if self._is_new("arrows", *arrows):
+            self._canvas.set_arrows(*arrows)
         light = state.light if state.layer == "relit" and shape is not None else None
         if self._is_new("light", light):
             self._canvas.set_light(light)
