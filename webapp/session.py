@@ -8,6 +8,7 @@ own and reports through the same worker.
 
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from threading import Event, Thread
 from time import monotonic
@@ -35,6 +36,7 @@ from .views.legend import LegendView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
+from .views.samples import SamplesView
 from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
@@ -104,6 +106,8 @@ class Session:
                 self._legend = LegendView(gui, self._stack, changed)
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
+        with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
+            self._samples = SamplesView(gui, self._stack, self._resample, self._set_Ts)
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
@@ -117,7 +121,8 @@ class Session:
         both = (self._picture, self._thresholds, self._pixel_view)
         self._readers = (self._run, *both, self._legend, self._compare, self._shape_view)
         self._drawers = (
-            *(*both, self._shares, self._summary, self._diagnosis, self._compare, self._shape_view),
+            *(*both, self._samples, self._shares, self._summary),
+            *(self._diagnosis, self._compare, self._shape_view),
         )
         self._keys = self._bind_keys()
         canvas.on_pick(self._pick)
@@ -214,9 +219,17 @@ class Session:
             self._tell(error)
 
     def _pick(self, pixel: Pixel) -> None:
-        if not self._shape_view.take(pixel):
+        if not (self._shape_view.take(pixel) or self._samples.take(pixel)):
             self._pixel = pixel
             self._wake.set()
+
+    def _set_Ts(self, Ts: float) -> None:
+        self._thresholds.set(replace(self._read().thresholds, Ts=Ts))
+
+    def _resample(self) -> None:
+        if self._frame is not None:
+            self._samples.draw(self._frame)
+        self._wake.set()
 
     def _pin(self) -> None:
         """Pin the selected pixel, or take its pin away; the oldest of too many goes."""
@@ -274,7 +287,7 @@ class Session:
         self._work.ensure(state)
         preview = self._follow(state, results)
         pins = tuple((*pin, str(n)) for n, pin in enumerate(self._pins, 1))
-        shape, marks = self._work.shape, (*pins, *self._shape_view.marks)
+        shape, marks = self._work.shape, (*pins, *self._shape_view.marks, *self._samples.marks)
         known = (
             frame is not None
             and (state, shape) == (frame.state, frame.shape)
