@@ -113,9 +113,9 @@ class Canvas:
         """Lay the picture on the surface and let the camera turn around it, or show it flat."""
         call_javascript(self._client, "window.photolin.setOrbit", on)
 
-    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
-        """Draw the lights of a shape around it, that of image `chosen` in a colour."""
-        self._relief.set_arrows(shape, chosen, visible)
+    def set_arrows(self, shape: Shape | None, chosen: int) -> None:
+        """Draw the lights of a shape around it, that of image `chosen` in a colour; None: none."""
+        self._relief.set_arrows(shape, chosen)
 
     def set_light(self, light: tuple[float, float] | None) -> None:
         """Show the ball on which a light is dragged, at x right, y up; None hides it."""

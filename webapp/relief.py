@@ -56,10 +56,10 @@ class Relief:
             )
         )
 
-    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
+    def set_arrows(self, shape: Shape | None, chosen: int) -> None:
         """Draw the lights as arrows towards the scene, that of image `chosen` in a colour."""
         self._client.scene.remove_by_name(ARROWS)
-        if shape is None or not visible:
+        if shape is None:
             return
         diagonal = float(np.hypot(*self._shape)) * self._pixel
         towards = shape.lights / np.linalg.norm(shape.lights, axis=1, keepdims=True)
