@@ -112,8 +112,9 @@ class Painter:
             self._canvas.set_surface(shape)
         if self._is_new("orbit", turning):
             self._canvas.set_orbit(turning)
-        if self._is_new("arrows", shape, state.image, turning and state.arrows):
-            self._canvas.set_arrows(shape, state.image, turning and state.arrows)
+        lit = shape if turning and state.arrows else None
+        if self._is_new("arrows", lit, state.image if lit else None):
+            self._canvas.set_arrows(lit, state.image)
         light = state.light if state.layer == "relit" and shape is not None else None
         if self._is_new("light", light):
             self._canvas.set_light(light)

@@ -241,14 +241,14 @@ class Session:
         rested = monotonic() - self._changed >= REST
         self._work.ensure(state)
         preview = self._follow(state, results)
-        shape, marks = self._work.shape, self._shape_view.marks
+        recovered, marks = self._work.recovered, self._shape_view.marks
         known = (
             frame is not None
-            and (state, shape) == (frame.state, frame.shape)
+            and (state, recovered) == (frame.state, frame.recovered)
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(self._stack, results, state, preview, shape)
+            self._frame = frame = compose(self._stack, results, state, preview, recovered)
             self._shown_results = results
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
             for view in self._drawers:

@@ -13,10 +13,11 @@ from photolin.shape.known import Known, Sphere
 from photolin.stack import ImageStack
 
 from ..frame import Frame
-from ..readout import describe_shape, escape
+from ..live import is_behind
+from ..readout import describe_shape, escape, shape_status
 from ..state import ViewState
 from ..values import choose_option, clamp_number
-from . import INDENT
+from . import ATTENTION, INDENT
 
 LIGHTS, POINTS, BALL, NOTHING = (
     "the lights of the stack",
@@ -24,6 +25,7 @@ LIGHTS, POINTS, BALL, NOTHING = (
     "a whole sphere",
     "nothing",
 )
+NO_SHAPE = "No shape yet. Say what is known of the scene, then recover it."
 ENOUGH = 5
 """Points from which the shape is recovered at once: the paper's number."""
 RIM, ON, CLEAR = "outline", "points", "clear"
@@ -168,8 +170,14 @@ class ShapeView:
 
     def draw(self, frame: Frame) -> None:
         """Say how the shape was found."""
-        text = "No shape yet." if frame.shape is None else describe_shape(frame.shape)
-        self._note.content = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        text = NO_SHAPE if frame.shape is None else describe_shape(frame.shape)
+        note = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        if stale := status_of(frame):
+            note = (
+                '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
+                f'{ATTENTION}">{escape(stale)}</div>{note}'
+            )
+        self._note.content = note
 
     def _outline(self) -> Sphere:
         row, column, radius = (clamp_number(n.value, -LARGEST, LARGEST, 1.0) for n in self._numbers)
@@ -207,6 +215,16 @@ class ShapeView:
             ON: f"Click points on the sphere: {count} of {ENOUGH} or more.",
         }[self._picking]
         self._told.content = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+
+
+def status_of(frame: Frame) -> str:
+    """That the shape is of another result than recovering again would take, or nothing."""
+    if frame.recovered is None:
+        return ""
+    shown = frame.analysis
+    behind = shown is not None and is_behind(frame.state, shown)
+    wanted = frame.state.thresholds if shown is None or behind else shown.thresholds
+    return shape_status(frame.recovered.analysis, shown, wanted)
 
 
 def outline_of(stack: ImageStack) -> Sphere:
