@@ -79,8 +79,7 @@ def heights(
 ) -> NDArray[np.float64]:
     """Heights (N,) between pixel centres, at whole rows and columns; NaN where none is."""
     H, W = depth.shape
-    with np.errstate(invalid="ignore"):
-        inside = (rows > -0.5) & (rows < H - 0.5) & (columns > -0.5) & (columns < W - 0.5)
+    inside = (rows > -0.5) & (rows < H - 0.5) & (columns > -0.5) & (columns < W - 0.5)
     r, c = rows.clip(0, H - 1), columns.clip(0, W - 1)
     top, left = np.minimum(r.astype(int), max(H - 2, 0)), np.minimum(c.astype(int), max(W - 2, 0))
     bottom, right = np.minimum(top + 1, H - 1), np.minimum(left + 1, W - 1)

@@ -5,19 +5,15 @@ function openLight({ layer, listen, lightId, sender }) {
   const RIM = 0.99; // of the radius: the farthest that a light goes
 
   const post = sender(lightId);
-  const frame = layer.appendChild(document.createElement("div"));
-  frame.style.cssText =
-    "position:absolute;right:14px;bottom:14px;text-align:center;font:12px system-ui;color:#fff;" +
-    "text-shadow:0 0 3px #000,0 0 2px #000";
-  frame.hidden = true;
-  const ball = frame.appendChild(document.createElement("div"));
+  const ball = layer.appendChild(document.createElement("div"));
   ball.className = "photolin-light";
   ball.title = "Drag: where the light comes from. Middle: from the camera; rim: from the side";
   ball.style.cssText =
-    `width:${BALL}px;height:${BALL}px;box-sizing:border-box;border-radius:50%;margin-bottom:4px;` +
-    "position:relative;pointer-events:auto;cursor:grab;touch-action:none;" +
-    "border:1px solid #fff8;box-shadow:0 0 0 1px #0008";
-  frame.append("drag the light");
+    `width:${BALL}px;height:${BALL}px;box-sizing:border-box;border-radius:50%;` +
+    "position:absolute;right:14px;bottom:44px;" + // above the line of text
+    "pointer-events:auto;cursor:grab;touch-action:none;border:1px solid #fff8;" +
+    "box-shadow:0 0 0 1px #0008";
+  ball.hidden = true;
   const spot = ball.appendChild(document.createElement("div"));
   spot.style.cssText =
     "position:absolute;width:12px;height:12px;margin:-6px 0 0 -6px;border-radius:50%;" +
@@ -25,7 +21,7 @@ function openLight({ layer, listen, lightId, sender }) {
 
   /** Show the ball with its spot at x right, y up, of a unit direction; null hides it. */
   function setLight(light) {
-    frame.hidden = light === null;
+    ball.hidden = light === null;
     if (light !== null && !ball.matches(":active")) draw(...light);
   }
 

@@ -28,7 +28,7 @@ LIGHTS, POINTS, BALL, NOTHING = (
 NO_SHAPE = "No shape yet. Say what is known of the scene, then recover it."
 ENOUGH = 5
 """Points from which the shape is recovered at once: the paper's number."""
-RIM, ON, CLEAR = "outline", "points", "clear"
+RIM, ON, SELECT, CLEAR = "outline", "points", "select", "clear"
 Picking = Literal["outline", "points"]
 LARGEST = 1e5
 
@@ -70,10 +70,10 @@ class ShapeView:
         )
         self._pick = gui.add_button_group(
             "Click on picture",
-            (RIM, ON, CLEAR),
+            (RIM, ON, SELECT, CLEAR),
             hint="outline: three clicks or more on the sphere's rim set centre and radius. points: "
-            "clicks on the sphere; from the fifth on, the shape is recovered at once. clear: "
-            "forget what was clicked",
+            "clicks on the sphere; from the fifth on, the shape is recovered at once. select: "
+            "clicks select pixels again. clear: forget what was clicked",
         )
         self._told = gui.add_html("")
         self._px_mm = gui.add_number(
@@ -171,7 +171,7 @@ class ShapeView:
     def draw(self, frame: Frame) -> None:
         """Say how the shape was found."""
         text = NO_SHAPE if frame.shape is None else describe_shape(frame.shape)
-        note = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        note = f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
         if stale := status_of(frame):
             note = (
                 '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
@@ -193,9 +193,8 @@ class ShapeView:
 
     def _begin(self, what: str) -> None:
         if what == CLEAR:
-            self._picking, self._rim, self._points = None, (), ()
-        else:
-            self._picking = RIM if what == RIM else ON
+            self._rim, self._points = (), ()
+        self._picking = what if what in (RIM, ON) else None
         self._tell()
         self._changed()
 
@@ -211,10 +210,12 @@ class ShapeView:
         count = len(self._points)
         text = {
             None: "Clicks select pixels.",
-            RIM: f"Click the sphere's rim: {len(self._rim)} of 3 or more.",
-            ON: f"Click points on the sphere: {count} of {ENOUGH} or more.",
+            RIM: f"Click the sphere's rim, three times or more: {len(self._rim)} so far.",
+            ON: f"Click points on the sphere, {ENOUGH} or more, spread wide: {count} so far.",
         }[self._picking]
-        self._told.content = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        self._told.content = (
+            f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
+        )
 
 
 def status_of(frame: Frame) -> str:
