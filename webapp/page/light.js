@@ -44,7 +44,10 @@ function openLight({ layer, listen, lightId, sender }) {
   }
 
   for (const type of ["pointerdown", "pointermove"]) listen(ball, type, drag);
-  listen(ball, "pointerdown", (event) => ball.setPointerCapture(event.pointerId));
+  listen(ball, "pointerdown", (event) => {
+    event.stopPropagation(); // it would move the picture too
+    ball.setPointerCapture(event.pointerId);
+  });
 
   return { setLight };
 }
