@@ -273,10 +273,12 @@ def test_a_click_on_the_surface_selects_the_pixel_that_is_seen_there(
             session._pixel = None
             page.mouse.click(*on_screen(page, depth, pixel))
             wait_until(lambda: session._pixel is not None)
-            off = np.abs(np.subtract(session._pixel, pixel)).max()
+            met = session._pixel
+            assert met is not None
+            off = np.abs(np.subtract(met, pixel)).max()
             worst = max(worst, off)
-            assert off <= 1, (drag, pixel, session._pixel)
-            expected = on_screen(page, depth, session._pixel)
+            assert off <= 1, (drag, pixel, met)
+            expected = on_screen(page, depth, met)
             wait_until(lambda at=expected: np.abs(ring_at(page) - at).max() < 1)
             page.wait_for_timeout(350)  # the next click is none of a double click
     print(f"clicks are off by at most {worst} pixels")
@@ -449,7 +451,7 @@ def test_a_shape_of_other_thresholds_says_so_until_it_is_recovered_again(
     wait_until(lambda: session._work.results["robust"].thresholds.T == 0.08)
     wait_until(lambda: not session._work._job._running)
     press(page, "n")
-    wait_until(lambda: session._work.recovered.analysis.thresholds.T == 0.08, 30)
+    wait_until(lambda: recovered(session).analysis.thresholds.T == 0.08, 30)
     page.get_by_text("This shape is of").wait_for(state="detached")
 
 

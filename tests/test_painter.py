@@ -296,3 +296,10 @@ def test_without_a_shape_nothing_is_turned_and_no_light_is_offered(
     painter.paint(frame(relief=True, layer="relit"), None, rested=False)
     drawn = canvas.take()
     assert (drawn["orbit"], drawn["arrows"], drawn["light"]) == (False, (None, 0), None)
+
+
+def test_captions_of_a_shape_say_nothing_of_labels(painter: Painter, canvas: FakeCanvas) -> None:
+    shown = ViewState(T=0.05, Ts=0.02, layer="normals")
+    painter.paint(compose(STACK, {"robust": RESULT}, shown, None, RECOVERED), None, rested=True)
+    assert canvas.readout.startswith("normals: red x right")
+    assert "labels" not in canvas.readout

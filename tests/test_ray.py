@@ -113,6 +113,14 @@ def test_heights_are_linear_between_pixels_and_end_half_a_pixel_beyond_them() ->
     assert np.isfinite(edge).tolist() == [True, False, False]
 
 
+def test_heights_reach_half_a_pixel_into_a_hole() -> None:
+    hole = np.full((H, W), 3, np.float32)
+    hole[5, 5] = np.nan
+    found = heights(hole, np.full(4, 5.0), np.array([4.4, 4.6, 5.4, 5.6]))
+    assert found[[0, 3]].tolist() == [3, 3]
+    assert np.isnan(found[1:3]).all()
+
+
 def test_a_box_is_entered_and_left_where_the_ray_crosses_its_faces() -> None:
     low, high = np.zeros(3), np.array([4.0, 5.0, 6.0])
     assert clip_ray((np.array([1.0, 1, 10]), DOWN), low, high) == (4, 10)

@@ -147,7 +147,10 @@ def test_a_scale_of_zero_is_none(view: ShapeView) -> None:
 
 
 def test_the_switches_are_part_of_the_state(view: ShapeView) -> None:
+    view.draw(frame(recovered=None))
+    view.toggle()
     assert not view.read(ViewState()).relief
+    view.draw(frame())
     view.toggle()
     assert view.read(ViewState()).relief
     view._arrows.value = False

@@ -100,6 +100,7 @@ class ShapeView:
             "lights", True, hint="Arrows from the lights, orange for the image shown (only in 3D)"
         )
         for handle in (self._relief, self._arrows):
+            handle.disabled = True  # until there is a shape
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
@@ -141,8 +142,9 @@ class ShapeView:
         return True
 
     def toggle(self) -> None:
-        """Flat or 3D."""
-        self._relief.value = not self._relief.value
+        """Flat or 3D, once there is a shape."""
+        if not self._relief.disabled:
+            self._relief.value = not self._relief.value
 
     def known(self) -> Known:
         """What is known of the scene, as set here.
@@ -178,6 +180,8 @@ class ShapeView:
                 f'{ATTENTION}">{escape(stale)}</div>{note}'
             )
         self._note.content = note
+        for handle in (self._relief, self._arrows):
+            handle.disabled = frame.shape is None
 
     def _outline(self) -> Sphere:
         row, column, radius = (clamp_number(n.value, -LARGEST, LARGEST, 1.0) for n in self._numbers)
