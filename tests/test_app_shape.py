@@ -286,6 +286,30 @@ def test_a_click_on_the_surface_selects_the_pixel_that_is_seen_there(
     assert session._pixel is not None
 
 
+def test_each_pixel_of_the_picture_lies_on_its_point_of_the_surface(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app())
+    shape = recover(page, session).shape
+    assert shape.depth is not None
+    session._shape_view._arrows.value = False
+    press(page, "ArrowUp", "ArrowUp")  # from relit to normals, whose colours tell all sides apart
+    wait_until(lambda: session._frame is not None and session._frame.state.layer == "normals")
+    turn_on(page)
+    for drag in ((0, 0), (60, -30)):
+        if any(drag):
+            turn(page, *drag)
+        page.mouse.move(300, 2)
+        page.wait_for_timeout(500)
+        window = screenshot(page).astype(int)
+        expected = render_surface(shape, "normals", (0, 0), STACK.mask)[0]
+        for pixel in ((60, 80), (40, 80), (75, 80), (60, 65), (60, 95)):
+            x, y = on_screen(page, shape.depth, pixel)
+            shown = window[int(y), int(x)]
+            # a pixel's neighbours on a sphere of 51 pixels differ by 3 steps
+            assert np.abs(shown - expected[pixel]).max() <= 4, (drag, pixel)
+
+
 def test_what_the_surface_hides_is_not_marked(page: Any, open_app: OpenApp) -> None:
     session = enter(page, open_app())
     recover(page, session)
@@ -322,6 +346,8 @@ def test_the_flat_picture_is_as_before_after_3d(page: Any, open_app: OpenApp) ->
     before = camera_rotation(page)
     turn(page, 60, 20)
     assert camera_rotation(page) == pytest.approx(before, abs=1e-9)
+    scale, left, top = view
+    assert similarity(page) == pytest.approx((scale, left + 60, top + 20), abs=0.5)
 
 
 def test_in_3d_keys_turn_nothing_and_fit_double_click_and_window_keep_the_surface_in_view(

@@ -1,20 +1,27 @@
 """Pictures of a shape: each pixel's colour from its numbers."""
 
+import io
 from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from photolin.shape.recover import Shape
 from photolin.shape.relight import relight
 from photolin.shape.resolved import Resolved
+from webapp.render import encode_png
 from webapp.state import SURFACE, Layer
 from webapp.surface import UNKNOWN, range_of, render_grey, render_normals, render_surface
 
 H, W = 12, 16
 MASK = np.ones((H, W), bool)
 MASK[:2] = False
+
+
+def decode(png: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(png)))
 
 
 def make_shape(**changes: Any) -> Shape:
@@ -128,3 +135,16 @@ def test_every_layer_of_a_shape_is_a_layer_of_the_tool() -> None:
     brighter = replace(SHAPE, albedo=SHAPE.albedo * 5)
     one, other = (render_surface(s, "albedo", (0, 0), MASK)[0] for s in (SHAPE, brighter))
     assert np.abs(one.astype(int) - other).max() <= 1
+
+
+@pytest.mark.parametrize("layer", SURFACE)
+def test_pictures_can_be_encoded_whatever_the_order_of_the_arrays(layer: Layer) -> None:
+    turned = make_shape(
+        normals=np.moveaxis(np.moveaxis(SHAPE.normals, 2, 0).copy(), 0, 2),
+        albedo=np.asfortranarray(SHAPE.albedo),
+        depth=np.asfortranarray(SHAPE.depth),
+    )
+    picture, _ = render_surface(turned, layer, (0.3, 0.2), MASK)
+    assert np.array_equal(
+        decode(encode_png(picture)), render_surface(SHAPE, layer, (0.3, 0.2), MASK)[0]
+    )
