@@ -111,7 +111,7 @@ def choose(page: Any, handle: Any, option: str) -> None:
 
 
 def push(page: Any, name: str) -> None:
-    page.get_by_text(name, exact=True).last.click()
+    page.locator("button:visible").get_by_text(name, exact=True).click()
     page.wait_for_timeout(100)
     leave_widgets(page)
 
@@ -363,7 +363,7 @@ def test_in_3d_keys_turn_nothing_and_fit_double_click_and_window_keep_the_surfac
     turned = camera_matrix(page)
     press(page, "w", "a", "q", "ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown")
     rest(page)
-    assert camera_matrix(page) == pytest.approx(turned, abs=1e-9)
+    assert camera_matrix(page) == pytest.approx(turned, abs=1e-4)  # a key of viser turns by 0.04
 
     press(page, "f")
     rest(page)

@@ -90,8 +90,7 @@ def test_the_first_frame_draws_everything_and_the_same_again_nothing(
     painter: Painter, canvas: FakeCanvas
 ) -> None:
     assert painter.paint(frame(), None, rested=False) is False
-    drawn = {"base png", "overlay", "marker", "pins", "orbit", "arrows", "light"}
-    assert set(canvas.take()) == drawn
+    assert set(canvas.take()) == {"base png", "overlay", "marker"}
     assert painter.paint(frame(), None, rested=True) is False
     assert canvas.take() == {}
 
@@ -294,8 +293,7 @@ def test_without_a_shape_nothing_is_turned_and_no_light_is_offered(
     painter: Painter, canvas: FakeCanvas
 ) -> None:
     painter.paint(frame(relief=True, layer="relit"), None, rested=False)
-    drawn = canvas.take()
-    assert (drawn["orbit"], drawn["arrows"], drawn["light"]) == (False, (None, 0), None)
+    assert not {"surface", "orbit", "arrows", "light"} & set(canvas.take())
 
 
 def test_captions_of_a_shape_say_nothing_of_labels(painter: Painter, canvas: FakeCanvas) -> None:

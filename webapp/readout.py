@@ -58,6 +58,20 @@ def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:
     return f"{observed} i = {lit} ≥ Ts = {level} and {_lit_rule(factor, i, l, T)}."
 
 
+def rule_of(i: float, l: float, thresholds: Thresholds) -> str:
+    """The rule of Eq. (3) that decided one observation, in a few words."""
+    factor = Factor(int(classify(i, l, thresholds)))
+    if not np.isfinite(l):
+        return "l unknown"
+    if i < thresholds.Ts:
+        return "dark, faces away" if factor is Factor.ATTACHED else "dark, yet faces the light"
+    if factor is Factor.DIFFUSE:
+        return "i is l within T"
+    if factor is Factor.SPECULAR:
+        return "brighter than l"
+    return "darker than l" if l > i else "lit, yet faces away"
+
+
 def _lit_rule(factor: Factor, i: float, l: float, T: float) -> str:
     distance, slack = _apart(abs(i - l), T * i)
     if factor is Factor.DIFFUSE:

@@ -29,6 +29,8 @@ class Desk:
 
     read: Callable[[], ViewState]
     """The state that all widgets together stand for."""
+    begin: Callable[[Thresholds], None]
+    """Move the sliders to where they start."""
     move: Callable[[Thresholds], None]
     """Move the sliders."""
     busy: Callable[[bool], None]
@@ -146,7 +148,7 @@ class Work:
         untouched = not self._results and self._desk.read().thresholds == self._first
         self.deliver(method, result)
         if untouched:
-            self._desk.move(result.thresholds)
+            self._desk.begin(result.thresholds)
 
     def _suggest(self) -> None:
         with cancelling("suggestion", "T and Ts are kept"):
