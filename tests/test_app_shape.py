@@ -456,12 +456,14 @@ def test_what_does_not_work_is_told_in_the_words_of_the_command_line(
     wait_for_text(page, "This did not work")
     wait_for_text(page, "lie nearly in one plane")
     assert session._work.recovered is None
+    wait_until(lambda: not session._work._job._running)
     click_pixel(page, 2, 2)
     wait_for_text(page, "the point at row 2, column 2 is outside the sphere")
 
     push(page, "clear")
     push(page, "points")
     dismiss_notes(page)
+    wait_until(lambda: not session._work._job._running)
     click_all(page, session, FIVE)
     assert recovered(session).shape.resolved.residual < 2
 
