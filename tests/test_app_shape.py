@@ -117,11 +117,9 @@ def push(page: Any, name: str) -> None:
 
 
 def dismiss_notes(page: Any) -> None:
-    notes = page.locator(".mantine-Notification-root")
-    while count := notes.count():
-        notes.first.get_by_role("button").click()
-        page.wait_for_timeout(400)  # it fades
-        assert notes.count() < count
+    buttons = "document.querySelectorAll('.mantine-Notification-root button')"
+    page.evaluate(f"{buttons}.forEach((button) => button.click())")
+    page.wait_for_function(f"{buttons}.length === 0")  # once they have faded
 
 
 def click_all(page: Any, session: Session, pixels: tuple[tuple[int, int], ...]) -> None:
