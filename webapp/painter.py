@@ -80,7 +80,8 @@ class Painter:
         if self._is_new("marks", marks):
             self._canvas.set_pins(marks)
         self._paint_surface(frame)
-        caption = self._legend + (HIDDEN if hides_labels(frame) else "")
+        told = hides_labels(frame) and state.layer in SIGNED  # who sees a shape expects no labels
+        caption = self._legend + (HIDDEN if told else "")
         self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
         return self._rough
 

@@ -175,6 +175,24 @@ def describe_shape(shape: Shape) -> str:
     return " ".join(sentences)
 
 
+def shape_status(used: Analysis, wanted: Analysis | None, thresholds: Thresholds) -> str:
+    """That a shape is not of what is on screen, or nothing.
+
+    Args:
+        used: what the shape was recovered from.
+        wanted: the result of the method on screen, if there is one.
+        thresholds: those that recovering again would use.
+    """
+    method = used.options.method
+    same = wanted is None or wanted.options.method == method
+    if same and used.thresholds == thresholds:
+        return ""
+    T, _ = _apart(used.thresholds.T, thresholds.T)
+    Ts, _ = _apart(used.thresholds.Ts, thresholds.Ts)
+    by = "" if same else f" by the method {method}"
+    return f"This shape is of T {T}, Ts {Ts}{by}; recover again to match what is on screen."
+
+
 def summarize(analysis: Analysis) -> str:
     """One run in one sentence: method, size, bases, thresholds, time."""
     K, H, W = analysis.labels.shape

@@ -286,15 +286,16 @@ class Session:
         moving = self._thresholds.settle(state.thresholds, rested)
         self._work.ensure(state)
         preview = self._follow(state, results)
+        recovered = self._work.recovered
         pins = tuple((*pin, str(n)) for n, pin in enumerate(self._pins, 1))
-        shape, marks = self._work.shape, (*pins, *self._shape_view.marks, *self._samples.marks)
+        marks = (*pins, *self._shape_view.marks, *self._samples.marks)
         known = (
             frame is not None
-            and (state, shape) == (frame.state, frame.shape)
+            and (state, recovered) == (frame.state, frame.recovered)
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(self._stack, results, state, preview, shape)
+            self._frame = frame = compose(self._stack, results, state, preview, recovered)
             self._shown_results = results
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
             for view in self._drawers:

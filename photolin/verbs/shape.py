@@ -11,7 +11,7 @@ from tyro.conf import Positional
 
 from ..analysis import Analysis, Cancel, Options, Progress
 from ..console import progress_bar, stop_at_ctrl_c
-from ..errors import DegenerateError, InputError, OutputError
+from ..errors import InputError, OutputError
 from ..export import (
     check_output,
     is_result,
@@ -22,14 +22,12 @@ from ..export import (
     write_files,
 )
 from ..export.lights import lights_diligent, lights_lp
-from ..export.maps import Convention
-from ..export.shape import shape_files
+from ..export.surface import surface_files
 from ..load import LoadOptions, load_channels
 from ..pipeline import analyze
 from ..shape.chrome_ball import estimate_lights
 from ..shape.colour import colour_albedo
 from ..shape.known import Sphere, read_known
-from ..shape.mesh import build_mesh
 from ..shape.recover import Shape, check_scale, recover_shape
 from ..shape.resolve import NOTHING, Known, resolve_ambiguity
 from ..stack import ImageStack
@@ -89,7 +87,7 @@ def shape(
             images, result, known, px_mm=px_mm, threads=threads, progress=progress, cancel=cancel
         )
         colour = measure_colour(source, reading, result, found, progress)
-    files = describe_surface(found, result, colour, convention="directx" if directx else "opengl")
+    files = surface_files(found, result, colour, convention="directx" if directx else "opengl")
     about = {"command": COMMAND.get(), "stack_path": source, "load_options": reading}
     # all at once: an interruption leaves either all or what was there before
     write_files(out, result_files(result, shape=found, **about) | files)
@@ -143,32 +141,6 @@ def measure_colour(
     except InputError:
         return None
     return np.stack(planes, axis=2)
-
-
-def describe_surface(
-    found: Shape,
-    analysis: Analysis,
-    colour: NDArray[np.float32] | None = None,
-    convention: Convention = "opengl",
-) -> dict[str, bytes]:
-    """Every file of a shape, name to bytes; albedo is `colour` (H,W,3) where there is one."""
-    mesh = None
-    if found.depth is not None:
-        try:
-            mesh = build_mesh(found.depth, analysis.mask, found.px_mm or 1.0)
-        except DegenerateError:  # single pixels
-            mesh = None
-    return shape_files(
-        analysis.mask,
-        normals=found.normals,
-        albedo=found.albedo if colour is None else colour,
-        depth=found.depth,
-        mesh=mesh,
-        lights=found.lights,
-        names=analysis.names,
-        px_mm=found.px_mm,
-        convention=convention,
-    )
 
 
 def lights(
