@@ -28,7 +28,11 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 | { } | Ts down, up |
 | S | suggest T and Ts |
 | R | linearize again with T and Ts |
+| Z, Shift-Z | undo, redo a change of T or Ts |
 | M | next method |
+| P | pin the selected pixel to compare with |
+| X, U | next image where it is specular, undefined |
+| B | compare: all of one picture, all of the other |
 | 1 … 5 | show or hide D, S, A, C, U |
 | space held | without overlay |
 | N | recover the shape, as the tab Shape says |
