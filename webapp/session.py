@@ -107,6 +107,7 @@ class Session:
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
+            self._thresholds.add_steps(gui)
             self._samples = SamplesView(gui, self._stack, self._resample, self._set_Ts)
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)

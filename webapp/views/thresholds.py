@@ -64,12 +64,6 @@ class ThresholdView:
             "(key: S). linearize again: T and Ts enter the linearization itself; until then only "
             "the labels follow the sliders (key: R)",
         )
-        self._steps = gui.add_button_group(
-            "  ",
-            (UNDO, REDO, RESET),
-            hint="undo, redo: changes of T and Ts, a step for each rest of the sliders (keys: Z, "
-            "Shift-Z). reset: T and Ts of the first result",
-        )
         self.begin(initial)
         for handle in (self._T, self._Ts, self._live):
 
@@ -83,11 +77,20 @@ class ThresholdView:
         async def _(_: viser.GuiEvent) -> None:
             actions[self._buttons.value]()
 
-        steps = {UNDO: self.undo, REDO: self.redo, RESET: self.reset}
+    def add_steps(self, gui: viser.GuiApi) -> None:
+        """Add the buttons that undo, redo and reset; where there is room for them."""
+        steps = gui.add_button_group(
+            "T and Ts",
+            (UNDO, REDO, RESET),
+            hint="undo, redo: changes of T and Ts, a step for each rest of the sliders (keys: Z, "
+            "Shift-Z). reset: T and Ts of the first result",
+        )
 
-        @self._steps.on_click
+        actions = {UNDO: self.undo, REDO: self.redo, RESET: self.reset}
+
+        @steps.on_click
         async def _(_: viser.GuiEvent) -> None:
-            steps[self._steps.value]()
+            actions[steps.value]()
 
     def begin(self, thresholds: Thresholds) -> None:
         """Move both sliders to where they start, without a step that could be undone."""
