@@ -48,6 +48,7 @@ from .pipeline import analyze
 from .stack import ImageStack
 from .synthetic import Truth, load_truth
 from .verbs import COMMAND, bind, read_stack
+from .verbs.report import report
 from .verbs.scenes import info, synth
 from .verbs.shape import lights, measure_shape, shape
 
@@ -219,7 +220,7 @@ def _stack_of(result: Path) -> ImageStack | None:
 
 VERBS = {
     verb.__name__: bind(verb)
-    for verb in (run, inspect, shape, export, evaluate, lights, synth, info)
+    for verb in (run, inspect, shape, export, report, evaluate, lights, synth, info)
 }
 """Name of each verb and what makes its call."""
 
