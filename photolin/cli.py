@@ -42,6 +42,7 @@ from .load import LoadOptions
 from .pipeline import analyze
 from .verbs import COMMAND, bind, read_stack
 from .verbs.evaluate import evaluate
+from .verbs.report import report
 from .verbs.scenes import info, synth
 from .verbs.shape import lights, measure_shape, shape
 
@@ -159,7 +160,7 @@ def export(
 
 VERBS = {
     verb.__name__: bind(verb)
-    for verb in (run, inspect, shape, export, evaluate, lights, synth, info)
+    for verb in (run, inspect, shape, export, report, evaluate, lights, synth, info)
 }
 """Name of each verb and what makes its call."""
 

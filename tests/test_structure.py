@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 FLOORS = (
     ("errors", "factors", "stack", "analysis", "observations", "compiling"),
     ("kernels", "blocks", "consensus", "sample"),
-    ("load", "synthetic"),
+    ("load", "synthetic", "command"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine", "saturation"),
     ("robust", "label", "shadow_level", "thresholds"),
     ("linearize", "follow"),

@@ -16,6 +16,7 @@ from ..stack import ImageStack, check_lights, check_mask
 from .arrays import find_arrays
 from .decode import Plan, make_plan, read_images
 from .diligent import LIST, POWERS, find_diligent
+from .exclude import describe_excluded, kept_images, pick_frames
 from .folder import find_folder
 from .layout import Layout
 from .lights import read_lights
@@ -41,17 +42,21 @@ def load_stack(
 
     Raises:
         InputError: a file cannot be used; names it.
-        OptionError: the region lies outside the images.
+        OptionError: the region lies outside the images; exclude names an image that is not there,
+            or leaves too few.
         DegenerateError: the lights lie in one plane.
     """
     try:
-        layout = with_options(find_layout(Path(path)), options)
+        whole = find_layout(Path(path))
+        layout = with_options(whole, options)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     plan = make_plan(layout, options)
-    images, notes = read_images(layout, plan, progress)
+    excluded = pick_frames(whole, options.exclude) if options.exclude else None
+    images, notes = read_images(layout, plan, progress, excluded)
     mask, mask_note = _read_mask(layout, plan)
-    lights, lights_note = _read_lights(layout, options)
+    lights, lights_note = _read_lights(layout, whole, options)
+    left_out = [] if excluded is None else [describe_excluded(f.name for f in excluded.frames)]
     extra = [p for p in (*layout.dark, *layout.masks, *layout.lights) if isinstance(p, Path)]
     return ImageStack(
         images=images,
@@ -60,7 +65,14 @@ def load_stack(
         title=layout.title,
         lights=lights,
         files=_digests([*layout.files, *extra]),
-        notes=(*layout.notes, *_notes(layout, plan, options), *notes, mask_note, lights_note),
+        notes=(
+            *layout.notes,
+            *_notes(layout, plan, options),
+            *notes,
+            mask_note,
+            lights_note,
+            *left_out,
+        ),
     )
 
 
@@ -86,7 +98,13 @@ def find_layout(path: Path) -> Layout:
 
 
 def with_options(layout: Layout, options: LoadOptions) -> Layout:
-    """`layout` with the files that `options` name in place of its own."""
+    """`layout` with the files that `options` name in place of its own, and without the images that
+    they exclude; its lights, if any, are those of all images still.
+
+    Raises:
+        InputError: several files could be the mask or the lights.
+        OptionError: exclude names an image that is not there, or leaves too few.
+    """
     if options.lights is not None:
         lights = () if options.lights == "none" else (Path(options.lights),)
         layout = replace(layout, lights=lights)
@@ -101,6 +119,9 @@ def with_options(layout: Layout, options: LoadOptions) -> Layout:
                 f"{layout.where}: {names} could each be the {option} file; name one with the "
                 f"option {option}"
             )
+    if options.exclude:
+        kept = kept_images(options.exclude, len(layout.frames), str(layout.where))
+        layout = pick_frames(layout, kept)
     return layout
 
 
@@ -123,17 +144,21 @@ def _read_mask(layout: Layout, plan: Plan) -> tuple[NDArray[np.bool_], str]:
     return mask, f"mask: {source} ({np.count_nonzero(mask)} of {mask.size} pixels)"
 
 
-def _read_lights(layout: Layout, options: LoadOptions) -> tuple[NDArray[np.float64] | None, str]:
-    """The lights (K,3), and where they are from."""
-    names = tuple(frame.name for frame in layout.frames)
+def _read_lights(
+    layout: Layout, whole: Layout, options: LoadOptions
+) -> tuple[NDArray[np.float64] | None, str]:
+    """The lights (K,3), and where they are from: one for each image of the `whole` stack, of which
+    those of excluded images are dropped."""
+    names = tuple(frame.name for frame in whole.frames)
+    kept = kept_images(options.exclude, len(names), str(layout.where))
     found = next(iter(layout.lights), None)
     if found is None:
         return None, f"lights: {'ignored, as asked' if options.lights == 'none' else 'not given'}"
     if isinstance(found, Path):
-        return read_lights(found, names), f"lights: {found.name}"
+        return read_lights(found, names)[kept], f"lights: {found.name}"
     lights = np.atleast_2d(found).astype(np.float64)
     check_lights(lights, len(names), str(layout.where))
-    return lights, f"lights: of {layout.where.name}"
+    return lights[kept], f"lights: of {layout.where.name}"
 
 
 def _notes(layout: Layout, plan: Plan, options: LoadOptions) -> list[str]:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -76,15 +77,31 @@ def _read_dark(paths: Sequence[Path], plan: Plan) -> list[NDArray]:
 
 
 def read_images(
-    layout: Layout, plan: Plan, progress: Progress | None
+    layout: Layout, plan: Plan, progress: Progress | None, excluded: Layout | None = None
 ) -> tuple[NDArray[np.float32], list[str]]:
     """All images (K,H,W) of the region in [0, 1], and what had to be done for that.
+
+    Args:
+        excluded: images of the same stack that are left out. They have a say in the scale of
+            values above 1, so that leaving one out does not change the unit of Ts.
 
     Raises:
         InputError: names the first image, in order, that cannot be used.
     """
     images, top = read_values(layout, plan, progress)
+    if excluded is not None and (plan.first.pixels.dtype.kind == "f" or layout.powers is not None):
+        top = max(top, _brightest(excluded, plan))
     return images, _fit(images, top, plan)
+
+
+def _brightest(excluded: Layout, plan: Plan) -> float:
+    """The maximum of images that are left out, those aside that could not be read anyway."""
+    top = 0.0
+    for k, frame in enumerate(excluded.frames):
+        power = None if excluded.powers is None else excluded.powers[k]
+        with suppress(InputError):
+            top = max(top, float(_read_image(frame, plan, power).max()))
+    return top
 
 
 def read_values(

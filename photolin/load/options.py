@@ -1,6 +1,8 @@
 """How a stack is read."""
 
+import operator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -28,6 +30,8 @@ class LoadOptions:
     """Constant subtracted from all images, fraction of full scale: ambient light, black level."""
     roi: tuple[int, int, int, int] | None = None
     """Region to read: row0, row1, column0, column1, half-open; everything when left out."""
+    exclude: tuple[int, ...] = ()
+    """Images to leave out, numbers from 0 in the order of the files; what is left counts anew."""
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
@@ -45,3 +49,14 @@ class LoadOptions:
                     f"roi is {self.roi}; accepted is row0 row1 col0 col1 with 0 <= row0 < row1 "
                     "and 0 <= col0 < col1"
                 )
+        self._order_exclude()
+
+    def _order_exclude(self) -> None:
+        """Any sequence, as JSON gives a list, becomes a tuple in ascending order."""
+        exclude = tuple(sorted(map(operator.index, self.exclude)))
+        if exclude and exclude[0] < 0:
+            raise OptionError(f"exclude is {exclude[0]}; accepted are image numbers from 0")
+        for k, following in pairwise(exclude):
+            if k == following:
+                raise OptionError(f"exclude names image {k} twice; accepted is each image once")
+        object.__setattr__(self, "exclude", exclude)

@@ -1,0 +1,144 @@
+"""The session of a stack, what the user chose, as a file: written, and read back with suspicion."""
+
+from dataclasses import dataclass, field, replace
+from math import nextafter
+from typing import Any, get_type_hints
+
+import msgspec
+
+from photolin.errors import InputError, OptionError
+from photolin.load import LoadOptions
+from photolin.stack import MIN_IMAGES
+
+from .state import ViewState
+from .values import MAX_TEXT
+
+Pixel = tuple[int, int]
+"""(row, column)"""
+
+VERSION = 1
+"""Of the file's layout; files of another are not read."""
+MAX_PINS = 4
+MAX_BYTES = 1 << 18
+"""Of a file; far more than the longest notes take."""
+RANGES: dict[str, tuple[float, float]] = {
+    "T": (0.0, 1.0),
+    "Ts": (0.0, nextafter(1, 0)),
+    "opacity": (0.0, 1.0),
+    "gain": (1e-3, 1e6),
+}
+"""Where numbers of a file are brought to; a T of 0 is then refused, as nothing near it is meant."""
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What a new tab needs to look like the one before."""
+
+    state: ViewState = field(default_factory=ViewState)
+    """T, Ts, method, image, layer, selected pixel and how they are shown; its image counts those
+    that are left."""
+    pins: tuple[Pixel, ...] = ()
+    """(row, column) of pixels to compare, MAX_PINS at most."""
+    exclusions: tuple[int, ...] = ()
+    """Images left out, as in `LoadOptions.exclude`: numbers of the whole stack."""
+    notes: str = ""
+    """The user's own words, MAX_TEXT characters at most; any text."""
+
+    def __post_init__(self) -> None:
+        if len(self.pins) > MAX_PINS:
+            raise OptionError(f"{len(self.pins)} pins; up to {MAX_PINS} are accepted")
+        if len(self.notes) > MAX_TEXT:
+            raise OptionError(
+                f"notes of {len(self.notes)} characters; up to {MAX_TEXT} are accepted"
+            )
+        object.__setattr__(self, "exclusions", LoadOptions(exclude=self.exclusions).exclude)
+
+
+def encode_saved(saved: Saved) -> bytes:
+    """The file of a session: JSON for people to read too."""
+    notes = saved.notes.encode(errors="replace").decode()  # half a character is no text
+    entries = {"version": VERSION, **msgspec.to_builtins(replace(saved, notes=notes))}
+    return msgspec.json.format(msgspec.json.encode(entries), indent=1) + b"\n"
+
+
+def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple[str, ...]]:
+    """The session of a file, whatever it holds.
+
+    Numbers beyond their range are brought into it; images and pixels that the stack does not have
+    are dropped, as it may have changed. What else cannot be is as in a new session.
+
+    Args:
+        shape: (K,H,W) of the whole stack.
+
+    Returns:
+        The session, and a sentence for each entry that was not taken as it was.
+
+    Raises:
+        InputError: not a session of this version at all.
+    """
+    entries = _entries(data)
+    told: list[str] = []
+
+    def take(name: str, kind: Any, default: Any) -> Any:
+        try:
+            return msgspec.convert(entries.get(name, default), kind)
+        except (msgspec.ValidationError, OverflowError) as error:
+            told.append(_sentence(name, error))
+            return default
+
+    K, H, W = shape
+    inside = [p for p in take("pins", list[Pixel], []) if 0 <= p[0] < H and 0 <= p[1] < W]
+    notes = take("notes", str, "")
+    if len(inside) > MAX_PINS or len(notes) > MAX_TEXT:
+        told.append(f"session: {MAX_PINS} pins and {MAX_TEXT} characters of notes are kept")
+    exclusions = take("exclusions", tuple[int, ...], ())
+    try:
+        exclusions = LoadOptions(exclude=exclusions).exclude
+        if exclusions and (exclusions[-1] >= K or K - len(exclusions) < MIN_IMAGES):
+            raise OptionError("not these images, or too few besides, are there")
+    except OptionError as error:
+        told.append(_sentence("exclusions", error))
+        exclusions = ()
+    state, faults = _read_state(take("state", dict, {}), (K - len(exclusions), H, W))
+    saved = Saved(state, tuple(inside[:MAX_PINS]), exclusions, notes[:MAX_TEXT])
+    return saved, (*told, *faults)
+
+
+def _entries(data: bytes) -> dict[str, Any]:
+    if len(data) > MAX_BYTES:
+        raise InputError(f"is larger than {MAX_BYTES} bytes, which no session is")
+    try:
+        entries = msgspec.json.decode(data, type=dict[str, Any])
+    except (msgspec.MsgspecError, RecursionError, ValueError) as error:
+        raise InputError("is no session of photolin, or was cut short") from error
+    if entries.get("version") != VERSION or isinstance(entries["version"], bool):
+        raise InputError(f"is no session of version {VERSION}")
+    return entries
+
+
+def _read_state(
+    entries: dict[str, Any], shape: tuple[int, int, int]
+) -> tuple[ViewState, list[str]]:
+    """Each entry of a ViewState on its own, so that a bad one costs no other."""
+    K, H, W = shape
+    ranges = {**RANGES, "image": (0, K - 1)}
+    state, told = ViewState(), []
+    for name, kind in get_type_hints(ViewState).items():
+        if name not in entries:
+            continue
+        try:
+            value = msgspec.convert(entries[name], kind)
+            if name in ranges and value is not None:
+                low, high = ranges[name]
+                value = min(max(value, low), high)
+            state = replace(state, **{name: value})
+        except (msgspec.ValidationError, OptionError, OverflowError) as error:
+            told.append(_sentence(name, error))
+    if state.pixel is not None and not (0 <= state.pixel[0] < H and 0 <= state.pixel[1] < W):
+        state = replace(state, pixel=None)
+    return state, told
+
+
+def _sentence(name: str, error: Exception) -> str:
+    why = " ".join(str(error).split())[:120]
+    return f"session: {name} is not as it can be ({why}); it is as at first"
