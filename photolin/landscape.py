@@ -108,16 +108,18 @@ def map_landscape(
         told = truth.reshape(len(truth), -1)
         rows[:] = len(ACCURATE)
         rows[list(ACCURATE)] = np.arange(len(ACCURATE))
-    X = stack.images.reshape(len(stack.images), -1)
+    images, c = (
+        stack.images.reshape(len(stack.images), -1),
+        analysis.coefficients.astype(np.float32),
+    )
     bases = np.ascontiguousarray(analysis.linearized_bases).reshape(3, -1)
-    c = analysis.coefficients.astype(np.float32)
     tolerances, shadows = (level.astype(np.float32) for level in levels)
     size = (rows.max() + 1, 5, cells + 2, cells + 2)
     parts = np.zeros((-(-len(picks) // BLOCK), *size), np.int64)
 
     def work(start: int, stop: int) -> None:
         part = parts[start // BLOCK]
-        landscape_rows(X, bases, c, told, rows, picks, tolerances, shadows, part, start, stop)
+        landscape_rows(images, bases, c, told, rows, picks, tolerances, shadows, part, start, stop)
 
     run_blocks(work, len(picks), BLOCK, stage="landscape", progress=progress, cancel=cancel)
     return _summarize(parts.sum(axis=0), levels, len(picks), truth is not None)

@@ -109,6 +109,17 @@ def test_thresholds_met_exactly_zeros_and_unknown_values_are_counted_right(seed:
     assert land.undetermined > 0
 
 
+def test_a_value_of_zero_is_specular_until_T_is_one() -> None:
+    """|i - l| = T i exactly then; the rule's own border."""
+    images = np.full((6, 2, 2), 0.5, np.float32)
+    analysis = made(images, np.zeros((3, 2, 2), np.float32), T=1.0, Ts=0.5)
+    land = map_landscape(wrap(images), analysis, (0.25, 1), (0.25, 0.9), cells=3)
+    row, column = land.cell(1, 0.5)
+    assert (land.T[column], land.Ts[row]) == (1, 0.5)
+    assert land.shares[Factor.DIFFUSE, row, column] == 1
+    assert (land.shares[Factor.SPECULAR, : row + 1, :column] == 1).all()
+
+
 def test_the_present_thresholds_have_a_cell_of_their_own_with_the_present_labels() -> None:
     for T, Ts in ((0.05, 0.03), (0.0471, 0.0219), (0.2999, 0.0011)):
         analysis = analyze(SCENE.stack, Options(T=T, Ts=Ts, samples=20))
