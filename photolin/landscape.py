@@ -213,10 +213,9 @@ def _check(
 def _check_range(name: str, pair: Range) -> Range:
     low, high = pair
     if not (0 < low < high and (high <= 1 if name == "T" else high < 1)):
-        end = "up to 1" if name == "T" else "below 1"
         raise OptionError(
             f"the range of {name} is {low:g} to {high:g}; "
-            f"accepted is from above 0 to a greater number {end}"
+            f"accepted is from above 0 to a greater number {'up to' if name == 'T' else 'below'} 1"
         )
     return pair
 
@@ -240,14 +239,12 @@ def _axis(ends: Range, cells: int, present: float) -> NDArray[np.float64]:
 
 
 def _nearest(axis: NDArray[np.float64], value: float) -> int:
-    if not value > 0:
-        return 0
-    return int(np.argmin(np.abs(np.log(axis / value))))
+    return int(np.argmin(np.abs(np.log(axis / value)))) if value > 0 else 0
 
 
 def _ranks(count: int) -> NDArray[np.intp]:
     """Which of `count` mask pixels are looked at: all, or one at random of each of SAMPLE runs."""
     if count <= SAMPLE:
         return np.arange(count)
-    within = np.random.default_rng(0).random(SAMPLE)
-    return ((np.arange(SAMPLE) + within) * (count / SAMPLE)).astype(np.intp)
+    places = np.arange(SAMPLE) + np.random.default_rng(0).random(SAMPLE)
+    return (places * (count / SAMPLE)).astype(np.intp)
