@@ -20,13 +20,13 @@ RESIDUAL = 0.05
 """How much farther an image may be from its linearization than the median image, of i."""
 MOVED = 0.7
 """Pixels from which a shift is worth a word."""
-BETTER = 0.9
+BETTER = 0.8
 """What is left of the difference at edges, at most, for a shift to be believed."""
-WINDOW, TAPER, SMOOTH = 512, 16, 6.0
-"""Pixels: the part of the picture that is compared, its fading border, and what is slower than
-edges."""
-FEWEST = 400
-"""Pixels that it takes to tell a shift."""
+WINDOW, TAPER, FINE, COARSE = 512, 12, 1.0, 6.0
+"""Pixels: the part of the picture that is compared, its fading border, what is too
+fine to be compared, and what is too coarse to be an edge."""
+FEWEST, FARTHEST = 400, 8
+"""Pixels that it takes to tell a shift, and the part of the picture that it may be."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ def measure_shift(
         mask: (H,W)
 
     Returns:
-        None where fewer than FEWEST pixels are known, or nothing varies.
+        None where too few pixels are known, nothing varies, or the best shift is no small one.
     """
     from skimage.registration import phase_cross_correlation
 
@@ -189,21 +189,26 @@ def measure_shift(
         return None
     box = _middle(np.flatnonzero(known.any(axis=1))), _middle(np.flatnonzero(known.any(axis=0)))
     inside = known[box]
-    weight = inside.astype(np.float32)
-    around = np.maximum(gaussian_filter(weight, SMOOTH), 1e-3)
     fade = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1] / TAPER
     lit = np.maximum(np.where(inside, linearized[box], 0), 0)
+    weight = inside.astype(np.float32)
+    around = np.maximum(gaussian_filter(weight, COARSE), 1e-3)
     a, b = (
-        (x - gaussian_filter(x * weight, SMOOTH) / around) * np.minimum(fade, 1)
+        (x - gaussian_filter(x * weight, COARSE) / around) * np.minimum(fade, 1)
         for x in (image[box], lit)
     )
     if not (a.any() and b.any()):
         return None
-    # the edges' own difference, so that dots of noise elsewhere do not decide
-    slope = np.hypot(np.gradient(b, axis=0), np.gradient(b, axis=1))[inside]
-    edges = slope >= np.quantile(slope, 0.8)
     back = phase_cross_correlation(b, a, upsample_factor=10)[0]
-    before, after = (np.median(np.abs(x - b)[inside][edges]) for x in (a, move(a, back, order=1)))
+    # smooth alike, for moving by parts of pixels smooths too
+    a, b = (gaussian_filter(x, FINE) for x in (a, b))
+    # where edges are and both pictures reach, so that dots of noise and borders do not decide
+    whole = (fade >= 1) & (move(np.minimum(fade, 1), back, order=1) > 0.99)
+    if np.abs(back).max() > min(inside.shape) / FARTHEST or whole.sum() < FEWEST:
+        return None
+    slope = np.hypot(np.gradient(b, axis=0), np.gradient(b, axis=1))
+    edges = whole & (slope >= np.quantile(slope[whole], 0.8))
+    before, after = (np.median(np.abs(x - b)[edges]) for x in (a, move(a, back, order=1)))
     left = float(after / before) if before > 0 else 1.0
     return Shift(float(-back[0]), float(-back[1]), left)
 

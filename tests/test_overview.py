@@ -146,6 +146,14 @@ def test_values_far_from_the_others_are_told(field: str, value: float, words: st
     assert len(found) == (16 if field == "saturated" else 0)
 
 
+@pytest.mark.parametrize("field", ["gain", "residual"])
+def test_where_all_images_scatter_none_stands_out(field: str) -> None:
+    confidence = RESULT.confidence
+    assert confidence is not None
+    given: dict[str, Any] = {field: np.linspace(0.7, 1.3, 16)}
+    assert findings(STACK, replace(RESULT, confidence=replace(confidence, **given))) == {}
+
+
 def test_image_1_does_not_get_the_words_on_image_11() -> None:
     confidence = RESULT.confidence
     assert confidence is not None
@@ -208,9 +216,19 @@ def test_nothing_tells_a_shift_in_a_flat_or_a_black_image() -> None:
     texture = np.random.default_rng(0).random((40, 50), np.float32)
     for image, linearized in [(black, texture), (texture, -texture), (black, black)]:
         assert measure_shift(image, linearized, mask) is None
+    far = np.roll(texture, 15, axis=0)
+    assert measure_shift(far, texture, mask) is None
     for image, linearized in [(flat, flat), (texture, texture), (flat, texture)]:
         shift = measure_shift(image, linearized, mask)
         assert shift is None or not shift.sure
+
+
+def test_a_shift_between_pictures_of_different_things_is_not_sure() -> None:
+    rng, mask = np.random.default_rng(0), np.ones((128, 128), bool)
+    pairs = [[rng.random((128, 128), np.float32) for _ in range(2)] for _ in range(40)]
+    shifts = [measure_shift(one, other, mask) for one, other in pairs]
+    assert max(abs(shift.rows) for shift in shifts if shift is not None) > 2
+    assert not any(shift.sure for shift in shifts if shift is not None)
 
 
 def test_outside_the_mask_nothing_counts() -> None:
