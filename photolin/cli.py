@@ -14,20 +14,16 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from .analysis import METHODS, Analysis, Options
+from .analysis import Options
 from .console import (
-    MEASURES,
     complain,
     mend_streams,
     parse,
     progress_bar,
     run_summary,
     stop_at_ctrl_c,
-    thresholds,
 )
-from .errors import InputError, OutputError
-from .evaluate import Evaluation, format_evaluation
-from .evaluate import evaluate as measure
+from .errors import OutputError
 from .export import (
     CONTENTS,
     Contents,
@@ -43,11 +39,9 @@ from .export import (
     write_files,
 )
 from .load import LoadOptions
-from .paper import compare_with_paper
 from .pipeline import analyze
-from .stack import ImageStack
-from .synthetic import Truth, load_truth
 from .verbs import COMMAND, bind, read_stack
+from .verbs.evaluate import evaluate
 from .verbs.scenes import info, synth
 from .verbs.shape import lights, measure_shape, shape
 
@@ -161,60 +155,6 @@ def export(
         files |= export_files(analysis, contents, image or None)
     write_files(out, files)
     print(f"written {len(files)} files to {out}")
-
-
-def evaluate(
-    path: Positional[Path],
-    truth: Positional[Path | None] = None,
-    reading: LoadOptions = LoadOptions(),
-    *,
-    T: float | None = None,
-    Ts: float | None = None,
-    seed: int = 0,
-    threads: int | None = None,
-) -> None:
-    """Compare with ground truth: one result, or all three methods on a stack.
-
-    Args:
-        path: Folder that run wrote, or a stack. A stack is analyzed by each method in turn.
-        truth: gt.npz, or the folder that holds it; the stack's own when left out.
-        T: Relative tolerance for a stack, above 0 up to 1; suggested when left out.
-        Ts: Shadow level for a stack, fraction of full scale; suggested when left out.
-        seed: Seed for a stack.
-        threads: Processors to use; all when left out.
-    """
-    if is_result(path):
-        if truth is None:
-            raise InputError(f"{path}: is a result; name its ground truth (gt.npz) after it")
-        result = load_result(path)
-        title = f"{result.title}, {result.options.method}, {thresholds(result)}"
-        print(format_evaluation(_measure(result, load_truth(truth), _stack_of(path)), title))
-        print(MEASURES)
-        return
-    answer = load_truth(path if truth is None else truth)
-    with progress_bar() as progress, stop_at_ctrl_c() as cancel:
-        images, _ = read_stack(path, reading, progress)
-        each = [Options(method, T, Ts, seed=seed) for method in METHODS]
-        results = [
-            analyze(images, o, threads=threads, progress=progress, cancel=cancel) for o in each
-        ]
-    for result in results:
-        print(f"{result.options.method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
-    print(compare_with_paper({r.options.method: _measure(r, answer, images) for r in results}))
-    print(MEASURES)
-
-
-def _measure(result: Analysis, truth: Truth, stack: ImageStack | None) -> Evaluation:
-    images = None if stack is None else stack.images
-    return measure(result.labels, result.coefficients, result.linearized_bases, truth, images)
-
-
-def _stack_of(result: Path) -> ImageStack | None:
-    """The stack of a result, None where it is not there any more."""
-    try:
-        return load_result_stack(result)
-    except InputError:
-        return None
 
 
 VERBS = {

@@ -224,7 +224,10 @@ MEASURES = """\
 macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect
 rms: root mean square of linearized minus ideal image, fraction of full scale
 p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale
-light error: mean angle between true and estimated lights, up to one linear map for all, degrees"""
+light error: mean angle between true and estimated lights, up to one linear map for all, degrees
+normals: angle between true and found normals, degrees; pixels without one are counted apart
+depth: root mean square and largest error, mm, less the mean error of each connected part
+lights as found: mean angle between true lights and those of the shape, without any map, degrees"""
 """What the numbers of an evaluation mean, a line each."""
 
 

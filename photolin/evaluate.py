@@ -1,4 +1,7 @@
-"""How far a result is from the truth: Tables 1 and 2 of Mukaigawa et al. 2007, and errors."""
+"""How far a result is from the truth: Tables 1 and 2 of Mukaigawa et al. 2007, and errors.
+
+Table 3, of surfaces, is in shape.compare_methods.
+"""
 
 from dataclasses import dataclass
 
@@ -8,6 +11,9 @@ from numpy.typing import NDArray
 from .errors import InputError
 from .factors import LETTERS, Factor
 from .oracle import fit_oracle
+from .shape.compare_surface import SurfaceErrors, compare_surface, describe_errors
+from .shape.recover import Shape
+from .shape.true_surface import TrueSurface, surface_of
 from .synthetic import Truth
 
 ROWS = (Factor.CAST, Factor.ATTACHED, Factor.DIFFUSE, Factor.SPECULAR)
@@ -44,6 +50,8 @@ class Evaluation:
     """rms divided by that of least squares with the true labels and lights, over the pixels where
     both are known; NaN where the images were not given. Below 1 is possible: the oracle's D
     observations hold tails of highlights."""
+    surface: SurfaceErrors | None = None
+    """Normals, depth and lights of the result's shape; None where it has none."""
 
 
 def evaluate(
@@ -52,6 +60,7 @@ def evaluate(
     linearized_bases: NDArray[np.float32],
     truth: Truth,
     images: NDArray[np.float32] | None = None,
+    shape: Shape | None = None,
 ) -> Evaluation:
     """Compare a result with the truth of its stack.
 
@@ -61,6 +70,7 @@ def evaluate(
         linearized_bases: (3,H,W) signed, fraction of full scale.
         images: (K,H,W) the stack, for the oracle ratio.
         truth: of the same K images of H x W pixels.
+        shape: the surface that came of it.
 
     Raises:
         InputError: result and truth differ in shape.
@@ -104,7 +114,13 @@ def evaluate(
         undetermined=int((lit & ~known).sum()),
         light_error=light_error(coefficients, truth.lights),
         oracle_ratio=ratio,
+        surface=None if shape is None else measure_surface(shape, surface_of(truth)),
     )
+
+
+def measure_surface(shape: Shape, true: TrueSurface) -> SurfaceErrors:
+    """Errors of a shape over the mask of the truth; depth in mm by the scale of the truth."""
+    return compare_surface(shape.normals, true, depth=shape.depth, lights=shape.lights)
 
 
 def tabulate(
@@ -152,5 +168,6 @@ def format_evaluation(evaluation: Evaluation, title: str = "result") -> str:
             f"worst in image {e.worst_image}; {e.undetermined} pixels undetermined",
             f"light error         {e.light_error:.3f} degrees",
             *([] if np.isnan(e.oracle_ratio) else [f"oracle ratio        {e.oracle_ratio:.3f}"]),
+            *([] if e.surface is None else describe_errors(e.surface)),
         ]
     )

@@ -1,4 +1,4 @@
-"""The figures Mukaigawa et al. (2007) print for the sphere and cone, beside our own."""
+"""The figures Mukaigawa et al. (2007) print, beside our own."""
 
 from collections.abc import Mapping
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .analysis import Method
 from .evaluate import COLUMNS, ROWS, Evaluation
 from .factors import LETTERS
+from .shape.compare_methods import SIMPLE, MethodErrors
 
 COUNTS = (2393, 845, 15007, 955)
 """Table 1: pixels of one 160x120 image in each true class, in the order of ROWS."""
@@ -27,6 +28,15 @@ PUBLISHED: Mapping[Method, tuple[tuple[float, ...], ...]] = {
     ),
 }
 """Table 2, percent: (a) the previous method, (b) the proposed one; rows and columns C A D S."""
+
+TABLE_3: Mapping[str, tuple[float, float]] = {
+    SIMPLE: (5.11, 14.41),
+    "statistical": (4.04, 23.49),
+    "classification": (3.84, 9.85),
+}
+"""Table 3: root mean square and largest error of depth, mm, of a sphere behind obstacles."""
+ORDER = (*TABLE_3, "robust")
+"""Of the methods in that table."""
 
 
 def compare_with_paper(evaluations: Mapping[Method, Evaluation]) -> str:
@@ -55,6 +65,35 @@ def compare_with_paper(evaluations: Mapping[Method, Evaluation]) -> str:
         f"{e.light_error:11.3f}"
         for method, e in evaluations.items()
     ]
+    return "\n".join(lines)
+
+
+def compare_surfaces_with_paper(found: MethodErrors) -> str:
+    """Table 3 of the paper beside the errors of each method, as aligned text.
+
+    Relative figures are those of `simple`; the paper's are of its own sphere with obstacles.
+    """
+    first = found.errors[SIMPLE].depth
+    lines = [
+        f"Table 3: surfaces on {found.pixels} pixels, {found.note}",
+        f"{'':16} normals (degrees)     without      depth (mm)     relative to simple",
+        f"{'':16}    mean    median      normal     rms   largest       rms   largest"
+        "   | the paper's sphere",
+    ]
+    for method, e in sorted(found.errors.items(), key=lambda item: ORDER.index(item[0])):
+        depth = f"{'-':>8}{'-':>10}{'-':>10}{'-':>10}"
+        if e.depth is not None:
+            depth = f"{e.depth.rms:8.3f}{e.depth.largest:10.3f}"
+            shares = ("-", "-")
+            if first is not None and first.rms > 0:
+                shares = (
+                    f"{e.depth.rms / first.rms:.4f}",
+                    f"{e.depth.largest / first.largest:.4f}",
+                )
+            depth += f"{shares[0]:>10}{shares[1]:>10}"
+        printed = TABLE_3.get(method)
+        beside = "" if printed is None else f"   | {printed[0]:8.2f}{printed[1]:8.2f}"
+        lines.append(f"{method:16}{e.mean:8.3f}{e.median:10.3f}{e.undetermined:12}{depth}{beside}")
     return "\n".join(lines)
 
 

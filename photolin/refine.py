@@ -43,6 +43,8 @@ LATE = 2
 """Rounds on the whole sample, if they are not still before."""
 STILL = 2e-5
 """Change of the coefficients in one round, relative to their length, that ends the rounds."""
+DIM = 0.1
+"""Brightness, as a share of what pixels usually reach, below which being dimmer counts no more."""
 DAMPING = 1e-6
 NOISE_OBSERVATIONS = 120_000
 """Observations from which noise is read, at least."""
@@ -163,13 +165,20 @@ def weigh(
     Ts: float,
     width: float,
 ) -> NDArray[np.float64]:
-    """(M,K) weights of the observations: Gaussian in (i - l)/i for D, 0 for all others."""
+    """(M,K) weights of the observations: Gaussian in (i - l)/i for D, 0 for all others.
+
+    Times 1/i, down to DIM: the dimmer of two D observations departs less from Lambert's law, in
+    absolute terms, and from the fit.
+    """
     i = sample.pixels
     l = (coefficients.astype(np.float32) @ bases).T
     with np.errstate(invalid="ignore", divide="ignore"):
         residual = (i - l) / i
         diffuse = (i >= Ts) & (np.abs(residual) <= T) & (score >= MIN_SCORE)[:, None]
-    return np.where(diffuse, np.exp(-0.5 * (np.where(diffuse, residual, 0) / width) ** 2), 0.0)
+    bright = np.median(np.quantile(i, 0.95, axis=1))
+    surer = bright / np.maximum(i, DIM * bright)
+    fitting = np.exp(-0.5 * (np.where(diffuse, residual, 0) / width) ** 2)
+    return np.where(diffuse, surer * fitting, 0.0)
 
 
 def gauss_newton_step(
@@ -206,7 +215,8 @@ def gauss_newton_step(
             hessian[:, j, :, i] = block.T
     hessian = hessian.reshape(3 * K, 3 * K)
     # any 3x3 map of c fits as well: damping keeps those nine directions still
-    hessian[np.diag_indices(3 * K)] += DAMPING * np.trace(hessian) / (3 * K)
+    # where no pixel is known, nothing moves
+    hessian[np.diag_indices(3 * K)] += DAMPING * np.trace(hessian) / (3 * K) or 1.0
     return c + np.linalg.solve(hessian, gradient.ravel()).reshape(K, 3)
 
 

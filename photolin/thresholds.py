@@ -93,6 +93,7 @@ def suggest_from_sample(
         dark = CLEAR * clipped_noise(sample.images, found)
         if options.Ts is None and dark > Ts:
             Ts = shorten(dark)
+            starts = find_starts(sample, Ts, options, lights)
             found = linearize_sample(sample, starts, Ts, options, lights, cancel)
     if T is None:
         assert found is not None

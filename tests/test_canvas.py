@@ -76,7 +76,8 @@ def test_a_window_is_read_as_the_page_writes_it(text: str, window: Window) -> No
 
 
 def test_the_script_of_the_canvas_is_part_of_the_package() -> None:
-    assert "window.openCanvas" in resources.files("webapp").joinpath("canvas.js").read_text("utf-8")
+    canvas = resources.files("webapp").joinpath("page", "canvas.js").read_text("utf-8")
+    assert "window.openCanvas" in canvas
 
 
 # --- in a real browser ---

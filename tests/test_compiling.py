@@ -66,11 +66,11 @@ def command(tmp_path: Path) -> list[str]:
     """A run of a small stack whose loops are replaced by one that compiles at once."""
     np.save(tmp_path / "stack.npy", np.random.default_rng(0).random((6, 8, 8), np.float32))
     code = (
-        "import sys, numpy, numba, photolin.cli as cli\n"
+        "import sys, numpy, numba, photolin.cli as cli, photolin.errors as errors\n"
         "def analyze(*_, progress, **__):\n"
         "    progress('thresholds', 0.0)\n"
         "    numba.njit(lambda x: x + 1)(1)\n"
-        "    raise cli.InputError('enough')\n"
+        "    raise errors.InputError('enough')\n"
         "cli.analyze = analyze\n"
         "sys.exit(cli.main(sys.argv[1:]))"
     )

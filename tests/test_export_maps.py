@@ -108,6 +108,13 @@ def test_png_albedo_is_linear_with_a_scale_that_the_file_tells() -> None:
         assert not imagecodecs.png_decode(albedo_png(dark)).any()
 
 
+def test_the_order_of_arrays_in_memory_does_not_matter() -> None:
+    columns_first, reversed_rows = np.asfortranarray(NORMALS), NORMALS[::-1].copy()[::-1]
+    for encode in (normals_tiff, normals_png, albedo_tiff, albedo_png):
+        assert encode(columns_first) == encode(reversed_rows) == encode(NORMALS)
+    assert depth_tiff(np.asfortranarray(ALBEDO), "mm") == depth_tiff(ALBEDO, "mm")
+
+
 def test_what_cannot_be_encoded_is_refused() -> None:
     flat: Any = NORMALS[:, :, 0]
     for call in (

@@ -110,6 +110,14 @@ def test_another_reader_finds_the_same_mesh(mesh: Mesh, kind: str) -> None:
     assert (found.face_normals[:, 2] > 0).all()
 
 
+def test_the_order_of_albedo_in_memory_does_not_matter(mesh: Mesh) -> None:
+    colour = np.stack([ALBEDO, ALBEDO / 2, ALBEDO / 3], axis=2)
+    for albedo in (ALBEDO, colour):
+        other = np.asfortranarray(albedo)
+        assert mesh_ply(mesh, "mm", other) == mesh_ply(mesh, "mm", albedo)
+        assert mesh_obj(mesh, "mm", other) == mesh_obj(mesh, "mm", albedo)
+
+
 def test_albedo_of_another_picture_is_refused(mesh: Mesh) -> None:
     for call in (mesh_ply, mesh_obj):
         with pytest.raises(InputError, match="albedo of that picture is accepted"):

@@ -98,6 +98,15 @@ def test_slopes_up_to_ten_are_a_surface_at_any_step(slope: float, faces: int) ->
                 build_mesh(depth, everywhere(depth), step=step)
 
 
+@pytest.mark.parametrize(("low", "high", "joined"), [(7, 13.9, True), (9, 14.5, False)])
+def test_diagonals_may_rise_as_much_over_their_greater_length(
+    low: float, high: float, joined: bool
+) -> None:
+    depth = np.array([[0, np.nan], [low, high], [low, low]])
+    faces = build_mesh(depth, everywhere(depth)).faces
+    assert len(faces) == 2 + joined
+
+
 def test_squares_are_cut_along_the_diagonal_with_less_difference() -> None:
     for k, edge in enumerate([{1, 2}, {0, 3}]):
         depth = np.zeros((2, 2))

@@ -73,10 +73,22 @@ def test_a_large_picture_takes_few_steps(spread: float) -> None:
     given[:, 1:] += flow[:, :-1]
     given[1:] += fall[:-1]
     steps: list[int] = []
-    z = solve_laplace(right, down, given, np.zeros_like(truth), 1e-8, lambda: steps.append(1))
+    z = solve_laplace(right, down, given, np.zeros_like(truth), 1e-8, check=lambda: steps.append(1))
     assert len(steps) < (12 if spread == 0 else 60)
     wanted, found = (differences(a, right, down)[0] for a in (truth, z))
     np.testing.assert_allclose(found, wanted, atol=1e-3)
+
+
+def test_it_ends_after_most_steps_nearer_than_it_began() -> None:
+    right, down = weights(50, 50, 3)
+    A = matrix(right, down)
+    given = (A @ np.random.default_rng(3).normal(size=2500)).reshape(50, 50)
+    left = []
+    for most in (0, 2, 30):
+        z = solve_laplace(right, down, given, np.zeros((50, 50)), 1e-12, most)
+        left.append(np.linalg.norm(given - (A @ z.ravel()).reshape(50, 50)))
+    assert left[0] == np.linalg.norm(given)
+    assert left[0] > 2 * left[1] > 20 * left[2]
 
 
 def test_what_check_raises_ends_it() -> None:
@@ -84,7 +96,7 @@ def test_what_check_raises_ends_it() -> None:
         raise Cancelled("enough")
 
     with pytest.raises(Cancelled, match="enough"):
-        solve_laplace(*weights(9, 9), np.zeros((9, 9)), np.zeros((9, 9)), 1e-3, check)
+        solve_laplace(*weights(9, 9), np.zeros((9, 9)), np.zeros((9, 9)), 1e-3, check=check)
 
 
 def blocks(loop: Callable[..., None], H: int) -> Callable[..., None]:

@@ -11,16 +11,19 @@ from PIL import Image
 from photolin.analysis import Options
 from photolin.factors import PALETTE, Factor
 from photolin.pipeline import analyze
+from photolin.shape.recover import Shape, recover_shape
+from photolin.shape.resolve import resolve_ambiguity
 from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp import painter as module
-from webapp.frame import Frame, compose
+from webapp.frame import Frame, Recovered, compose
 from webapp.painter import Painter, describe, render_layer
 from webapp.render import choose_scale, render_residual
 from webapp.state import ViewState
 
 STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
 RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
+RECOVERED = Recovered(recover_shape(STACK, RESULT, resolve_ambiguity(RESULT)), RESULT)
 
 
 @dataclass
@@ -38,6 +41,21 @@ class FakeCanvas:
 
     def set_marker(self, pixel: tuple[int, int] | None) -> None:
         self.calls.append(("marker", pixel))
+
+    def set_pins(self, pins: object) -> None:
+        self.calls.append(("pins", pins))
+
+    def set_surface(self, shape: Shape | None) -> None:
+        self.calls.append(("surface", shape))
+
+    def set_orbit(self, on: bool) -> None:
+        self.calls.append(("orbit", on))
+
+    def set_arrows(self, shape: Shape | None, chosen: int) -> None:
+        self.calls.append(("arrows", (shape, chosen)))
+
+    def set_light(self, light: tuple[float, float] | None) -> None:
+        self.calls.append(("light", light))
 
     def set_readout(self, text: str) -> None:
         self.readout = text
@@ -243,3 +261,43 @@ def test_a_large_picture_is_sent_as_chosen(
     rough = painter.paint(frame(encoding=encoding), None, rested=rested)
     assert sent in canvas.take()
     assert rough == (encoding == "quick, then exact" and not rested)
+
+
+def test_the_surface_is_sent_once_it_is_turned_and_only_then(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    def draw(**state: Any) -> dict[str, Any]:
+        shown = ViewState(T=0.05, Ts=0.02, **state)
+        composed = compose(STACK, {"robust": RESULT}, shown, None, RECOVERED)
+        painter.paint(composed, None, rested=True)
+        return canvas.take()
+
+    assert "surface" not in draw()
+    turned = draw(relief=True)
+    assert turned["surface"] is RECOVERED.shape
+    assert turned["orbit"] is True
+    assert turned["arrows"] == (RECOVERED.shape, 0)
+    assert draw(relief=True) == {}
+    assert draw(relief=True, image=3)["arrows"] == (RECOVERED.shape, 3)
+    assert set(draw(relief=True, image=3, arrows=False)) == {"arrows"}
+    assert set(draw(relief=True, image=3, arrows=False)) == set()
+    flat = draw(image=3)
+    assert flat == {"orbit": False}
+    lit = draw(image=3, layer="relit", light=(0.1, 0.2))
+    assert set(lit) == {"base png", "overlay", "light"}
+    assert lit["light"] == (0.1, 0.2)
+    assert set(draw(image=3, layer="relit", light=(0.3, 0.2))) == {"base png", "light"}
+
+
+def test_without_a_shape_nothing_is_turned_and_no_light_is_offered(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    painter.paint(frame(relief=True, layer="relit"), None, rested=False)
+    assert not {"surface", "orbit", "arrows", "light"} & set(canvas.take())
+
+
+def test_captions_of_a_shape_say_nothing_of_labels(painter: Painter, canvas: FakeCanvas) -> None:
+    shown = ViewState(T=0.05, Ts=0.02, layer="normals")
+    painter.paint(compose(STACK, {"robust": RESULT}, shown, None, RECOVERED), None, rested=True)
+    assert canvas.readout.startswith("normals: red x right")
+    assert "labels" not in canvas.readout

@@ -76,7 +76,7 @@ def test_noisy_diffuse_images_are_solved_as_well_as_their_noise_allows() -> None
     assert light_error(found.coefficients, lights) < 0.2
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", [1, 2, 4])
 def test_bases_and_coefficients_explain_the_images_even_where_directions_are_noise(
     seed: int,
 ) -> None:
@@ -161,3 +161,10 @@ def test_observations_that_determine_nothing_are_refused() -> None:
     sample = draw_sample(wrap(images.reshape(stack.shape)), 0)
     with pytest.raises(DegenerateError, match="no base images explain the others"):
         refine_coefficients(sample, lights, 0.01, 0, 500)
+
+
+def test_a_step_from_pixels_that_determine_nothing_stays_where_it_is() -> None:
+    c = orthogonalize(np.random.default_rng(0).normal(size=(7, 3)))
+    X = np.full((5, 7), 0.5, np.float32)
+    for weights in (np.zeros((5, 7)), np.eye(5, 7)):
+        np.testing.assert_array_equal(gauss_newton_step(X, weights, c), c)

@@ -22,6 +22,8 @@ def test_every_field_changes_the_state():
         "image": 1, "layer": "residual", "method": "statistical", "T": 0.1, "Ts": 0.1,
         "opacity": 0.3, "shown": frozenset(), "outlines": True, "pixel": (0, 0), "gain": 2.0,
         "live": False, "encoding": "exact (PNG)", "beside": "statistical",
+        "against": "input", "divider": 0.2, "difference": True, "pins": ((1, 2),),
+        "relief": True, "arrows": False, "light": (0.1, 0.2),
     }  # fmt: skip
     assert set(changed) == set(asdict(ViewState()))
     for name, value in changed.items():
@@ -52,11 +54,22 @@ def test_each_layer_is_accepted(layer):
         ({"image": -1}, "image is -1; accepted is a number from 0"),
         (
             {"layer": "bases"},
-            "layer is 'bases'; accepted are input, linearized, residual, labels",
+            "layer is 'bases'; accepted are input, linearized, residual, labels, albedo, "
+            "normals, depth, relit",
         ),
         (
             {"method": "best"},
             "method is 'best'; accepted are robust, classification, statistical",
+        ),
+        ({"divider": 1.1}, "divider is 1.1; accepted is 0 to 1"),
+        (
+            {"pins": ((0, 0), (0, 0))},
+            "pins are ((0, 0), (0, 0)); accepted are 4 different pixels",
+        ),
+        (
+            {"light": (0.8, 0.8)},
+            "light is (0.8, 0.8); accepted are x and y of a direction towards the camera's side, "
+            "of length below 1",
         ),
         ({"opacity": 1.5}, "opacity is 1.5; accepted is 0 to 1"),
         ({"opacity": float("nan")}, "opacity is nan; accepted is 0 to 1"),

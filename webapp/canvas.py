@@ -1,6 +1,6 @@
 """The 2D canvas of one tab: a picture, an overlay on it, marks, and the pixel under the pointer.
 
-viser draws 3D scenes, so the picture is a plane that the camera faces squarely; `canvas.js` keeps
+viser draws 3D scenes, so the picture is a plane that the camera faces squarely; `page/` keeps
 it so in the page (drag pans, wheel zooms at the pointer, nothing rotates, pixels stay square) and
 fits it, at first and on double click. Pixels are (row, column) throughout.
 
@@ -108,14 +108,15 @@ class Canvas:
     def set_surface(self, shape: Shape | None) -> None:
         """The surface that the picture can be laid on; None removes it."""
         self._relief.set(shape)
+        self._send_marks()
 
     def set_orbit(self, on: bool) -> None:
         """Lay the picture on the surface and let the camera turn around it, or show it flat."""
         call_javascript(self._client, "window.photolin.setOrbit", on)
 
-    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
-        """Draw the lights of a shape around it, that of image `chosen` in a colour."""
-        self._relief.set_arrows(shape, chosen, visible)
+    def set_arrows(self, shape: Shape | None, chosen: int) -> None:
+        """Draw the lights of a shape around it, that of image `chosen` in a colour; None: none."""
+        self._relief.set_arrows(shape, chosen)
 
     def set_light(self, light: tuple[float, float] | None) -> None:
         """Show the ball on which a light is dragged, at x right, y up; None hides it."""
@@ -182,7 +183,11 @@ class Canvas:
 
     def _send_marks(self) -> None:
         marker = [] if self._marker is None else [(*self._marker, "")]
-        call_javascript(self._client, "window.photolin.setMarks", [*self._pins, *marker])
+        marks = [
+            (row, column, text, self._relief.height((row, column)))
+            for row, column, text in (*self._pins, *marker)
+        ]
+        call_javascript(self._client, "window.photolin.setMarks", marks)
 
 
 def window_in_text(text: str, shape: tuple[int, int]) -> Window | None:
@@ -214,4 +219,6 @@ def light_in_text(text: str) -> tuple[float, float] | None:
 
 @functools.cache
 def _javascript() -> str:
-    return Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
+    """The files of `page/`, as the body of one function: they see each other and nobody else."""
+    files = sorted((Path(__file__).parent / "page").glob("*.js"))
+    return "\n".join(['"use strict";', *(file.read_text(encoding="utf-8") for file in files)])

@@ -6,10 +6,15 @@ from dataclasses import replace
 from photolin.analysis import Analysis
 from photolin.errors import OptionError
 from photolin.export import export_files, result_files, safe_name, zip_files
+from photolin.export.surface import surface_files
 from photolin.factors import Thresholds
 from photolin.label import label_images
 from photolin.stack import ImageStack
 
+from .frame import Recovered
+
+SHAPE = "shape"
+"""The kind of `make_shape_download`."""
 Pack = Callable[[Analysis], Mapping[str, bytes]]
 """Gives the files of a result, name to bytes, as `result_files` does."""
 
@@ -58,3 +63,15 @@ def make_download(
         case "masks" | "labels":
             return f"{stem}_{which}_{kind}.zip", zip_files(export_files(analysis, kind, images))
     raise OptionError(f"export is {kind!r}; accepted are masks, labels, linearized and result")
+
+
+def make_shape_download(recovered: Recovered | None) -> tuple[str, bytes]:
+    """Name and bytes of a zip of normals, albedo, depth, mesh and lights.
+
+    Raises:
+        OptionError: there is no shape.
+    """
+    if recovered is None:
+        raise OptionError("there is no shape yet; recover one in the tab Shape (key: N)")
+    stem = safe_name(recovered.analysis.title) or "stack"
+    return f"{stem}_shape.zip", zip_files(surface_files(recovered.shape, recovered.analysis))

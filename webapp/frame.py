@@ -17,6 +17,14 @@ from .state import ViewState
 
 
 @dataclass(frozen=True, eq=False)
+class Recovered:
+    """A shape and the result it was recovered from."""
+
+    shape: Shape
+    analysis: Analysis
+
+
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One image of one result at the thresholds of one view."""
 
@@ -32,8 +40,13 @@ class Frame:
     """The same by the method compared with."""
     preview: Preview | None = None
     """What the labels are by, where no run has caught up with the view's thresholds."""
-    shape: Shape | None = None
+    recovered: Recovered | None = None
     """The latest shape; None while there is none."""
+
+    @property
+    def shape(self) -> Shape | None:
+        """The latest shape; None while there is none."""
+        return None if self.recovered is None else self.recovered.shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +66,7 @@ def compose(
     results: Mapping[Method, Analysis],
     state: ViewState,
     preview: Preview | None = None,
-    shape: Shape | None = None,
+    recovered: Recovered | None = None,
 ) -> Frame:
     """The frame of a view.
 
@@ -69,7 +82,7 @@ def compose(
     )
     if preview is not None and analysis is preview.near and labels is not None:
         labels = preview.paint(labels, state.image)
-    return Frame(stack, state, analysis, beside, labels, beside_labels, preview, shape)
+    return Frame(stack, state, analysis, beside, labels, beside_labels, preview, recovered)
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .canvas import Canvas, Pixel
+from .compare import differ, lay_over, other_frame, split
 from .frame import Frame
 from .readout import status_line
 from .render import (
@@ -17,7 +18,7 @@ from .render import (
     render_linearized,
     render_residual,
 )
-from .state import ENCODINGS, SURFACE
+from .state import ENCODINGS, SURFACE, Layer
 from .surface import render_surface
 
 SIGNED = ("linearized", "residual")
@@ -37,7 +38,13 @@ class Painter:
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
-        self._drawn: dict[str, object] = {}
+        self._drawn: dict[str, object] = {
+            "marks": ((),),
+            "orbit": (False,),
+            "arrows": (None, 0),
+            "light": (None,),
+        }
+        """The key by which each part was drawn; at first, what an empty canvas shows."""
         self._legend = ""
         self._rough = False
         self._encoded: dict[tuple[object, ...], tuple[bytes, str]] = {}
@@ -60,10 +67,11 @@ class Painter:
         shape = frame.shape if state.layer in SURFACE else None
         light = state.light if state.layer == "relit" else None
         look = (state.image, state.layer, state.gain, result, shape, light)
+        compared = compared_with(frame)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
-        if self._is_new("picture", *look, choice) or (exact and self._rough):
-            encoded, self._legend = self._encode(frame, (*look, exact), exact)
+        if self._is_new("picture", *look, compared, choice) or (exact and self._rough):
+            encoded, self._legend = self._encode(frame, (*look, compared, exact), exact)
             self._canvas.set_base(encoded, "png" if exact else "jpeg")
             self._rough = not exact and choice == 0
         self._paint_overlay(frame)
@@ -72,7 +80,8 @@ class Painter:
         if self._is_new("marks", marks):
             self._canvas.set_pins(marks)
         self._paint_surface(frame)
-        caption = self._legend + (HIDDEN if hides_labels(frame) else "")
+        told = hides_labels(frame) and state.layer in SIGNED  # who sees a shape expects no labels
+        caption = self._legend + (HIDDEN if told else "")
         self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
         return self._rough
 
@@ -81,8 +90,11 @@ class Painter:
         found = self._encoded.pop(key, None)
         if found is None:
             picture, legend = render_layer(frame)
+            if frame.state.against is not None:
+                picture = lay_beside(frame, picture, frame.state.against)
             found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
-        if frame.state.layer not in (*SIGNED, *SURFACE):  # these would keep results alive
+        # others would keep results alive
+        if frame.state.layer not in (*SIGNED, *SURFACE) and frame.state.against is None:
             self._encoded[key] = found  # the latest are last
         for oldest in list(self._encoded)[:-KEPT]:
             del self._encoded[oldest]
@@ -91,7 +103,7 @@ class Painter:
     def _paint_overlay(self, frame: Frame) -> None:
         state = frame.state
         solid = state.layer == "labels"
-        hidden = hides_labels(frame)
+        hidden = hides_labels(frame) or state.against is not None
         look = (state.shown, state.opacity, state.outlines, solid, hidden)
         if not self._is_new(
             "overlay", state.image, state.thresholds, frame.analysis, frame.preview, look
@@ -112,8 +124,9 @@ class Painter:
             self._canvas.set_surface(shape)
         if self._is_new("orbit", turning):
             self._canvas.set_orbit(turning)
-        if self._is_new("arrows", shape, state.image, turning and state.arrows):
-            self._canvas.set_arrows(shape, state.image, turning and state.arrows)
+        arrows = (shape, state.image) if turning and state.arrows else (None, 0)
+        if self._is_new("arrows", *arrows):
+            self._canvas.set_arrows(*arrows)
         light = state.light if state.layer == "relit" and shape is not None else None
         if self._is_new("light", light):
             self._canvas.set_light(light)
@@ -123,6 +136,24 @@ class Painter:
             return False
         self._drawn[part] = key
         return True
+
+
+def compared_with(frame: Frame) -> tuple[object, ...] | None:
+    """What decides the second picture and the labels of both; None without one."""
+    s = frame.state
+    if s.against is None:
+        return None
+    how = (s.against, s.divider, s.difference, s.shown, s.opacity, s.thresholds, s.light)
+    return (*how, frame.analysis, frame.beside, frame.preview, frame.shape)
+
+
+def lay_beside(frame: Frame, picture: NDArray[np.uint8], layer: Layer) -> NDArray[np.uint8]:
+    """The picture shown with another one beside it, each with its labels, (H,W,3)."""
+    other = other_frame(frame, layer)
+    one = lay_over(picture, frame, hides_labels(frame))
+    two = lay_over(render_layer(other)[0], other, hides_labels(other))
+    state = frame.state
+    return differ(one, two) if state.difference else split(one, two, state.divider)
 
 
 def hides_labels(frame: Frame) -> bool:

@@ -190,12 +190,12 @@ def _frame(axes: _Axes) -> str:
         f'<text x="{LEFT + wide + 4:g}" y="{TOP + 9}" font-weight="600" '
         f'fill="{_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
     ]
-    for value in _ticks(axes.left, axes.high):
+    for value in ticks(axes.left, axes.high):
         x, _ = axes.at(value, 0)
         parts.append(
             f'<text x="{LEFT + x:g}" y="{TOP + high + 14:g}" text-anchor="middle">{value:g}</text>'
         )
-    for value in _ticks(axes.low, axes.high):
+    for value in ticks(axes.low, axes.high):
         _, y = axes.at(0, value)
         parts.append(f'<text x="{LEFT - 5}" y="{TOP + y + 4:g}" text-anchor="end">{value:g}</text>')
     parts.append(
@@ -207,7 +207,7 @@ def _frame(axes: _Axes) -> str:
     return "".join(parts)
 
 
-def _ticks(low: float, high: float) -> list[float]:
+def ticks(low: float, high: float) -> list[float]:
     """Three to seven round numbers inside the range."""
     span = high - low
     power = 10.0 ** np.floor(np.log10(span / 3))

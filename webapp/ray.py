@@ -32,23 +32,46 @@ def meet_relief(depth: NDArray[np.float32], ray: Ray) -> tuple[int, int] | None:
             those of pixel centres, linear between them.
 
     Returns:
-        None where the ray meets nothing, or comes from behind.
+        None where the ray meets nothing, or the surface from behind.
     """
     eye, along = ray
-    if not (along[2] < 0 and np.isfinite(depth).any()):
+    H, W = depth.shape
+    if not np.isfinite(depth).any():
         return None
-    start, stop = ((level - eye[2]) / along[2] for level in (np.nanmax(depth), np.nanmin(depth)))
-    start = max(start - 1 / abs(along[2]), 0.0)
+    low, high = float(np.nanmin(depth)) - 1, float(np.nanmax(depth)) + 1
+    part = clip_ray(ray, np.array([0.0, 0.0, low]), np.array([W, H, high], float))
+    if part is None:
+        return None
+    start, stop = part
     length = np.hypot(along[0], along[1]) * (stop - start) * STEPS_A_PIXEL
     steps = int(np.clip(np.ceil(length), 8, MOST_STEPS))
-    points = eye + np.linspace(start, stop + 1 / abs(along[2]), steps)[:, None] * along
-    surface = heights(depth, points[:, 1] - 0.5, points[:, 0] - 0.5)
-    below = np.flatnonzero(points[:, 2] <= surface)
-    if not below.size:
+    points = eye + np.linspace(start, stop, steps)[:, None] * along
+    above = points[:, 2] - heights(depth, points[:, 1] - 0.5, points[:, 0] - 0.5)
+    with np.errstate(invalid="ignore"):
+        front = (above[:-1] > 0) & (above[1:] <= 0)
+        behind = (above[:-1] < 0) & (above[1:] >= 0)
+    met = np.flatnonzero(front | behind)
+    if not met.size or behind[met[0]]:
         return None
-    column, row = np.floor(points[below[0], :2]).astype(int)
-    H, W = depth.shape
+    n = met[0]
+    share = above[n] / (above[n] - above[n + 1])
+    column, row = np.floor(points[n, :2] + share * (points[n + 1, :2] - points[n, :2])).astype(int)
     return (int(np.clip(row, 0, H - 1)), int(np.clip(column, 0, W - 1)))
+
+
+def clip_ray(
+    ray: Ray, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[float, float] | None:
+    """From where to where, in lengths of its direction, a ray is in a box; None where nowhere."""
+    start, stop = 0.0, np.inf
+    for eye, along, one, other in zip(*ray, low, high, strict=True):
+        if along == 0:
+            if not one <= eye <= other:
+                return None
+            continue
+        near, far = sorted(((one - eye) / along, (other - eye) / along))
+        start, stop = max(start, near), min(stop, far)
+    return (float(start), float(stop)) if start < stop < np.inf else None
 
 
 def heights(
@@ -56,8 +79,7 @@ def heights(
 ) -> NDArray[np.float64]:
     """Heights (N,) between pixel centres, at whole rows and columns; NaN where none is."""
     H, W = depth.shape
-    with np.errstate(invalid="ignore"):
-        inside = (rows > -0.5) & (rows < H - 0.5) & (columns > -0.5) & (columns < W - 0.5)
+    inside = (rows > -0.5) & (rows < H - 0.5) & (columns > -0.5) & (columns < W - 0.5)
     r, c = rows.clip(0, H - 1), columns.clip(0, W - 1)
     top, left = np.minimum(r.astype(int), max(H - 2, 0)), np.minimum(c.astype(int), max(W - 2, 0))
     bottom, right = np.minimum(top + 1, H - 1), np.minimum(left + 1, W - 1)

@@ -58,6 +58,20 @@ def explain(i: float, l: float, thresholds: Thresholds, name: str) -> str:
     return f"{observed} i = {lit} ≥ Ts = {level} and {_lit_rule(factor, i, l, T)}."
 
 
+def rule_of(i: float, l: float, thresholds: Thresholds) -> str:
+    """The rule of Eq. (3) that decided one observation, in a few words."""
+    factor = Factor(int(classify(i, l, thresholds)))
+    if not np.isfinite(l):
+        return "l unknown"
+    if i < thresholds.Ts:
+        return "dark, faces away" if factor is Factor.ATTACHED else "dark, yet faces the light"
+    if factor is Factor.DIFFUSE:
+        return "i is l within T"
+    if factor is Factor.SPECULAR:
+        return "brighter than l"
+    return "darker than l" if l > i else "lit, yet faces away"
+
+
 def _lit_rule(factor: Factor, i: float, l: float, T: float) -> str:
     distance, slack = _apart(abs(i - l), T * i)
     if factor is Factor.DIFFUSE:
@@ -159,6 +173,24 @@ def describe_shape(shape: Shape) -> str:
     if not found.scaled:
         sentences.append("Albedo has no absolute scale.")
     return " ".join(sentences)
+
+
+def shape_status(used: Analysis, wanted: Analysis | None, thresholds: Thresholds) -> str:
+    """That a shape is not of what is on screen, or nothing.
+
+    Args:
+        used: what the shape was recovered from.
+        wanted: the result of the method on screen, if there is one.
+        thresholds: those that recovering again would use.
+    """
+    method = used.options.method
+    same = wanted is None or wanted.options.method == method
+    if same and used.thresholds == thresholds:
+        return ""
+    T, _ = _apart(used.thresholds.T, thresholds.T)
+    Ts, _ = _apart(used.thresholds.Ts, thresholds.Ts)
+    by = "" if same else f" by the method {method}"
+    return f"This shape is of T {T}, Ts {Ts}{by}; recover again to match what is on screen."
 
 
 def summarize(analysis: Analysis) -> str:

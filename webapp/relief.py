@@ -34,32 +34,30 @@ class Relief:
         self._client, self._shape = client, (height, width)
         self._pixel = world / height
         self._depth: NDArray[np.float32] | None = None
-        self._handles: list[viser.SceneNodeHandle] = []
 
     def set(self, shape: Shape | None) -> None:
         """Show this surface in place of the earlier one; None removes it."""
-        for handle in self._handles:
-            handle.remove()
-        self._handles = []
-        self._depth = None if shape is None else shape.depth
+        self._client.scene.remove_by_name(MESH)
+        self._depth = None
         if shape is None or shape.depth is None:
             return
-        known = np.isfinite(shape.depth)
         try:
-            mesh = build_mesh(shape.depth, known, most_vertices=MOST_VERTICES)
+            mesh = build_mesh(shape.depth, np.isfinite(shape.depth), most_vertices=MOST_VERTICES)
         except DegenerateError:  # single pixels: nothing to lay a picture on
             return
+        self._depth = shape.depth
         turned = mesh.vertices * (np.array([1, -1, -1], np.float32) * np.float32(self._pixel))
-        self._handles.append(
-            self._client.scene.add_mesh_simple(
-                MESH, turned, mesh.faces, side="double", cast_shadow=False, receive_shadow=False
-            )
+        self._client.scene.add_mesh_simple(
+            MESH, turned, mesh.faces, side="double", cast_shadow=False, receive_shadow=False
         )
 
-    def set_arrows(self, shape: Shape | None, chosen: int, visible: bool) -> None:
-        """Draw the lights as arrows towards the scene, that of image `chosen` in a colour."""
+    def set_arrows(self, shape: Shape | None, chosen: int) -> None:
+        """Draw the lights as arrows towards the scene, that of image `chosen` in a colour.
+
+        None removes them.
+        """
         self._client.scene.remove_by_name(ARROWS)
-        if shape is None or not visible:
+        if shape is None:
             return
         diagonal = float(np.hypot(*self._shape)) * self._pixel
         towards = shape.lights / np.linalg.norm(shape.lights, axis=1, keepdims=True)
@@ -76,6 +74,11 @@ class Relief:
             head_radius=size,
             head_length=2.5 * size,
         )
+
+    def height(self, pixel: Pixel) -> float | None:
+        """Height of the surface at a pixel, pixels towards the camera; None where there is none."""
+        z = np.nan if self._depth is None else float(self._depth[pixel])
+        return z if np.isfinite(z) else None
 
     def pixel_on(self, text: str) -> Pixel | None:
         """The pixel of the surface that a ray meets, as the page wrote it; None beside it."""

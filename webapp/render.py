@@ -110,7 +110,7 @@ def encode_labels(
     alphas = np.zeros(256, np.uint8)
     for factor in shown:
         colours[factor] = palette[factor]
-        alphas[factor] = round(255 * (1 if outlines or solid else _alpha(factor, opacity)))
+        alphas[factor] = round(255 * (1 if outlines or solid else alpha_of(factor, opacity)))
     H, W = labels.shape
     rows = np.zeros((H, W + 1), np.uint8)
     rows[:, 1:] = labels
@@ -135,8 +135,8 @@ def _percentile(values: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
     return float(np.percentile(sample, 99.5)) if sample.size else 0.0
 
 
-def _alpha(factor: Factor, opacity: float) -> float:
-    """Diffuse follows a power of the opacity: 0 and 1 stay, 55 % becomes 15 %."""
+def alpha_of(factor: Factor, opacity: float) -> float:
+    """Of a class; diffuse follows a power of the opacity: 0 and 1 stay, 55 % becomes 15 %."""
     if factor is not Factor.DIFFUSE:
         return opacity
     return float(opacity ** (np.log(DIFFUSE_OPACITY) / np.log(OPACITY)))

@@ -8,6 +8,7 @@ own and reports through the same worker.
 
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from threading import Event, Thread
 from time import monotonic
@@ -17,7 +18,7 @@ import viser
 
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, PhotolinError
-from photolin.factors import LETTERS, Thresholds
+from photolin.factors import LETTERS, Factor, Thresholds
 
 from .canvas import Canvas, Pixel, Window
 from .catch_up import CatchUp
@@ -26,13 +27,16 @@ from .frame import Frame, compose
 from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
-from .state import SURFACE, ViewState
+from .state import MOST_PINS, SURFACE, ViewState
+from .views.compare import CompareView
+from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
 from .views.help import HelpView
 from .views.legend import LegendView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
+from .views.samples import SamplesView
 from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
@@ -57,6 +61,7 @@ class Session:
         self._shown_results: dict[Method, Analysis] | None = None
         self._pixel: Pixel | None = None
         self._pointer: Pixel | None = None
+        self._pins: tuple[Pixel, ...] = ()
         self._light = ViewState.light
         T, Ts = runs.options.T, runs.options.Ts
         self._first = Thresholds(FIRST.T if T is None else T, FIRST.Ts if Ts is None else Ts)
@@ -101,6 +106,13 @@ class Session:
                 self._legend = LegendView(gui, self._stack, changed)
             with gui.add_folder("About this result"):
                 self._summary = SummaryView(gui)
+        with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
+            self._thresholds.add_steps(gui)
+            self._samples = SamplesView(gui, self._stack, self._resample, self._set_Ts)
+        with tabs.add_tab("Pixel", viser.Icon.TARGET):
+            self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)
+        with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
+            self._compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self._shape_view = ShapeView(gui, self._stack, changed, self._recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
@@ -108,8 +120,11 @@ class Session:
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self._picture, self._thresholds, self._pixel_view)
-        self._readers = (self._run, *both, self._legend, self._shape_view)
-        self._drawers = (*both, self._shares, self._summary, self._shape_view)
+        self._readers = (self._run, *both, self._legend, self._compare, self._shape_view)
+        self._drawers = (
+            *(*both, self._samples, self._shares, self._summary),
+            *(self._diagnosis, self._compare, self._shape_view),
+        )
         self._keys = self._bind_keys()
         canvas.on_pick(self._pick)
         canvas.on_hover(self._point)
@@ -122,6 +137,7 @@ class Session:
     def _desk(self) -> Desk:
         return Desk(
             read=self._read,
+            begin=self._start,
             move=self._move,
             busy=self._busy,
             progress=self._progress,
@@ -131,6 +147,9 @@ class Session:
             refuse=self._refuse,
             changed=self._wake.set,
         )
+
+    def _start(self, thresholds: Thresholds) -> None:
+        self._thresholds.begin(thresholds)
 
     def _move(self, thresholds: Thresholds) -> None:
         self._thresholds.set(thresholds)
@@ -170,17 +189,23 @@ class Session:
             "]": partial(self._thresholds.nudge, T=1),
             "{": partial(self._thresholds.nudge, Ts=-1),
             "}": partial(self._thresholds.nudge, Ts=1),
+            "z": self._thresholds.undo,
+            "Z": self._thresholds.redo,
             "m": self._run.turn,
             "r": self._work.linearize,
             "s": self._work.suggest,
             "e": lambda: self._work.download(*self._export.chosen()),
+            "p": self._pin,
+            "b": self._compare.flicker,
+            "x": partial(self._diagnosis.next, Factor.SPECULAR),
+            "u": partial(self._diagnosis.next, Factor.UNDEFINED),
             "n": self._recover,
             "d": self._shape_view.toggle,
             "escape": self._work.stop,
         }
 
     def _press(self, key: str) -> None:
-        if (action := self._keys.get(key.lower())) is None:
+        if (action := self._keys.get(key, self._keys.get(key.lower()))) is None:
             return
         try:
             action()
@@ -195,9 +220,29 @@ class Session:
             self._tell(error)
 
     def _pick(self, pixel: Pixel) -> None:
-        if not self._shape_view.take(pixel):
+        if not (self._shape_view.take(pixel) or self._samples.take(pixel)):
             self._pixel = pixel
             self._wake.set()
+
+    def _set_Ts(self, Ts: float) -> None:
+        self._thresholds.set(replace(self._read().thresholds, Ts=Ts))
+
+    def _resample(self) -> None:
+        if self._frame is not None:
+            self._samples.draw(self._frame)
+        self._wake.set()
+
+    def _pin(self) -> None:
+        """Pin the selected pixel, or take its pin away; the oldest of too many goes."""
+        if (pixel := self._pixel) is None:
+            return
+        others = tuple(pin for pin in self._pins if pin != pixel)
+        self._pins = others if pixel in self._pins else (*others, pixel)[-MOST_PINS:]
+        self._wake.set()
+
+    def _unpin(self) -> None:
+        self._pins = ()
+        self._wake.set()
 
     def _shine(self, light: tuple[float, float]) -> None:
         self._light = light
@@ -228,7 +273,7 @@ class Session:
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""
-        state = ViewState(pixel=self._pixel, light=self._light)
+        state = ViewState(pixel=self._pixel, pins=self._pins, light=self._light)
         for view in self._readers:
             state = view.read(state)
         return state
@@ -239,23 +284,26 @@ class Session:
         if frame is None or state != frame.state:
             self._changed = monotonic()
         rested = monotonic() - self._changed >= REST
+        moving = self._thresholds.settle(state.thresholds, rested)
         self._work.ensure(state)
         preview = self._follow(state, results)
-        shape, marks = self._work.shape, self._shape_view.marks
+        recovered = self._work.recovered
+        pins = tuple((*pin, str(n)) for n, pin in enumerate(self._pins, 1))
+        marks = (*pins, *self._shape_view.marks, *self._samples.marks)
         known = (
             frame is not None
-            and (state, shape) == (frame.state, frame.shape)
+            and (state, recovered) == (frame.state, frame.recovered)
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(self._stack, results, state, preview, shape)
+            self._frame = frame = compose(self._stack, results, state, preview, recovered)
             self._shown_results = results
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
             for view in self._drawers:
                 view.draw(frame)
         else:
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
-        return self._catch_up.pursue(state, results.get(state.method), rested) or rough
+        return self._catch_up.pursue(state, results.get(state.method), rested) or rough or moving
 
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
         """What the thresholds of the view make of what is on screen, where no run is right yet."""

@@ -14,6 +14,8 @@ SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
+MOST_PINS = 4
+
 
 @dataclass(frozen=True)
 class ViewState:
@@ -39,6 +41,12 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
+    against: Layer | None = None
+    """The layer, by the method beside where one is, that the picture is compared with."""
+    divider: float = 0.5
+    """Share of the width at which the compared picture begins, 0 to 1."""
+    difference: bool = False
+    """Show the difference of both in place of their parts."""
     relief: bool = False
     """Lay the picture on the surface, and turn around it."""
     arrows: bool = True
@@ -47,6 +55,8 @@ class ViewState:
     """x (right) and y (up) of the unit direction of the light of the layer relit."""
     pixel: tuple[int, int] | None = None
     """(row, column) of the selected pixel."""
+    pins: tuple[tuple[int, int], ...] = ()
+    """(row, column) of up to MOST_PINS pixels that are compared with the selected one."""
     gain: float | None = None
     """Display factor of input images, above 0; None means chosen from the stack."""
     encoding: Encoding = ENCODINGS[0]
@@ -69,6 +79,12 @@ class ViewState:
                 f"light is {self.light}; accepted are x and y of a direction towards the camera's "
                 "side, of length below 1"
             )
+        if self.against is not None and self.against not in LAYERS:
+            raise OptionError(f"against is {self.against!r}; accepted are {', '.join(LAYERS)}")
+        if not 0 <= self.divider <= 1:
+            raise OptionError(f"divider is {self.divider:g}; accepted is 0 to 1")
+        if len(self.pins) > MOST_PINS or len(set(self.pins)) < len(self.pins):
+            raise OptionError(f"pins are {self.pins}; accepted are {MOST_PINS} different pixels")
         if not 0 <= self.opacity <= 1:
             raise OptionError(f"opacity is {self.opacity:g}; accepted is 0 to 1")
         if self.gain is not None and not 0 < self.gain < float("inf"):

@@ -47,14 +47,14 @@ def render_normals(normals: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDA
     """Colours (H,W,3) of unit normals (H,W,3): -1 to 1 as 0 to 255 (OpenGL: green is up)."""
     picture = np.nan_to_num(normals * np.float32(127.5) + np.float32(128), nan=UNKNOWN)
     picture[~mask] = 0
-    return np.clip(picture, 0, 255).astype(np.uint8)
+    return np.clip(picture, 0, 255).astype(np.uint8, order="C")  # as encoders need it
 
 
 def render_grey(values: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """Greys (H,W) of values from 0, black, to 1, white; unknown ones in the mask mid-grey."""
-    picture = np.clip(np.nan_to_num(values * 255 + 0.5, nan=UNKNOWN), 0, 255).astype(np.uint8)
+    picture = np.clip(np.nan_to_num(values * 255 + 0.5, nan=UNKNOWN), 0, 255)
     picture[~mask] = 0
-    return picture
+    return picture.astype(np.uint8, order="C")  # as encoders need it
 
 
 def range_of(values: NDArray[np.floating], least: float) -> tuple[float, float]:

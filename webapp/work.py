@@ -9,10 +9,11 @@ from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError
 from photolin.factors import Thresholds
 from photolin.shape.known import Known
-from photolin.shape.recover import Shape, recover_shape
+from photolin.shape.recover import recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 
-from .downloads import Pack, make_download, relabel
+from .downloads import SHAPE, Pack, make_download, make_shape_download, relabel
+from .frame import Recovered
 from .job import Job
 from .live import is_behind
 from .runs import Runs
@@ -28,6 +29,8 @@ class Desk:
 
     read: Callable[[], ViewState]
     """The state that all widgets together stand for."""
+    begin: Callable[[Thresholds], None]
+    """Move the sliders to where they start."""
     move: Callable[[Thresholds], None]
     """Move the sliders."""
     busy: Callable[[bool], None]
@@ -61,7 +64,7 @@ class Work:
             self._results[runs.result.options.method] = runs.result
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
-        self._shape: Shape | None = None
+        self._recovered: Recovered | None = None
         self._job = Job(self._guarded, desk.changed)
 
     @property
@@ -70,9 +73,9 @@ class Work:
         return self._results
 
     @property
-    def shape(self) -> Shape | None:
+    def recovered(self) -> Recovered | None:
         """The latest shape."""
-        return self._shape
+        return self._recovered
 
     def deliver(self, method: Method, result: Analysis) -> None:
         """Take a result that was made elsewhere."""
@@ -96,8 +99,11 @@ class Work:
         self._begin(partial(self._linearize, state.method, state.thresholds))
 
     def download(self, kind: str, everything: bool) -> None:
-        """Send files of what is on screen, see `downloads.make_download`."""
-        self._begin(partial(self._send, self._desk.read(), kind, everything))
+        """Send files of what is on screen, see `downloads`."""
+        if kind == SHAPE:
+            self._begin(self._send_shape)
+        else:
+            self._begin(partial(self._send, self._desk.read(), kind, everything))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
         """Recover the shape from the result on screen.
@@ -142,7 +148,7 @@ class Work:
         untouched = not self._results and self._desk.read().thresholds == self._first
         self.deliver(method, result)
         if untouched:
-            self._desk.move(result.thresholds)
+            self._desk.begin(result.thresholds)
 
     def _suggest(self) -> None:
         with cancelling("suggestion", "T and Ts are kept"):
@@ -168,9 +174,10 @@ class Work:
     ) -> None:
         analysis = self._settled(state)
         self._desk.progress("shape", 0.0)
-        with cancelling("shape", "the earlier one is kept" if self._shape else "there is none"):
+        earlier = "the earlier one is kept" if self._recovered else "there is none"
+        with cancelling("shape", earlier):
             told = analysis if given_lights else replace(analysis, lights=None)
-            self._shape = recover_shape(
+            shape = recover_shape(
                 self._runs.stack,
                 analysis,
                 resolve_ambiguity(told, known),
@@ -178,6 +185,7 @@ class Work:
                 progress=self._desk.progress,
                 cancel=self._job.stopping,
             )
+        self._recovered = Recovered(shape, analysis)
         self._desk.shaped()
 
     def _send(self, state: ViewState, kind: str, everything: bool) -> None:
@@ -188,6 +196,10 @@ class Work:
         self._desk.send(
             *make_download(shown, kind, None if everything else state.image, self._pack)
         )
+
+    def _send_shape(self) -> None:
+        self._desk.progress("writing files", 0.5)
+        self._desk.send(*make_shape_download(self._recovered))
 
 
 @contextmanager

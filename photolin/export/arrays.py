@@ -45,17 +45,18 @@ CONFIDENCE = {
 SHAPE = {
     "normals": (np.float32, "HW3"),
     "albedo": (np.float32, "HW"),
-    "depth": (np.float32, "HW"),
+    "depth": (np.float64, "HW"),
+    "given_lights": (np.float64, "K3"),
 }
-"""The same for `shape.recover.Shape`, normals and albedo 0 where bases are not `determined`; depth
-only where it was asked for, in mm or pixels as report.json says, NaN where undetermined."""
+"""The same for `shape.recover.Shape`, whose `lights` are then those found with it; those that came
+with the stack, if any, are `given_lights`. Normals and albedo are 0 where bases are not
+`determined`. Depth only where it was asked for, in mm or pixels as report.json says, NaN where
+undetermined; in double precision, which gives the single precision of pixels back from mm."""
 KINDS = ARRAYS | CONFIDENCE | SHAPE
 
 
 def result_npz(analysis: Analysis, shape: Shape | None = None) -> bytes:
     """Encode the arrays of `result.npz`; equal results give equal bytes.
-
-    With a shape, `lights` are those found with it.
 
     Numpy dates every entry 1980, so no clock enters the archive.
     """
@@ -77,11 +78,13 @@ def result_npz(analysis: Analysis, shape: Shape | None = None) -> bytes:
     if analysis.confidence is not None:
         arrays |= vars(analysis.confidence)
     if shape is not None:
+        if analysis.lights is not None:
+            arrays["given_lights"] = analysis.lights
         arrays["lights"] = shape.lights
         arrays["normals"] = np.nan_to_num(shape.normals)
         arrays["albedo"] = np.nan_to_num(shape.albedo)
         if shape.depth is not None:
-            arrays["depth"] = shape.lengths(shape.depth)
+            arrays["depth"] = shape.depth.astype(np.float64) * (shape.px_mm or 1)
     buffer = io.BytesIO()
     typed = {name: np.asarray(value, KINDS[name][0]) for name, value in arrays.items()}
     np.savez_compressed(buffer, allow_pickle=False, **typed)
@@ -99,7 +102,7 @@ def read_arrays(file: Path) -> Mapping[str, NDArray]:
         raise foreign(file)
     if set(CONFIDENCE) & set(arrays) not in (set(), set(CONFIDENCE)):
         raise foreign(file)
-    if "depth" in arrays and not {"normals", "albedo", "lights"} <= set(arrays):
+    if set(SHAPE) & set(arrays) and not {"normals", "albedo", "lights"} <= set(arrays):
         raise foreign(file)
     sizes = {"3": 3}
     for name, array in arrays.items():

@@ -167,7 +167,8 @@ def _png(values: NDArray[np.float64], text: str, gamma: int | None = None) -> by
     """Values from 0 to 1 as 16-bit PNG; others are clipped."""
     from imagecodecs import png_encode
 
-    png = bytes(png_encode(np.round(values.clip(0, 1) * FULL).astype(np.uint16, order="C")))
+    whole = np.round(values.clip(0, 1) * FULL)
+    png = bytes(png_encode(np.ascontiguousarray(whole, np.uint16)))
     chunks = _chunk(b"tEXt", b"Description\0" + text.encode("latin-1"))
     if gamma is not None:
         chunks = _chunk(b"gAMA", gamma.to_bytes(4, "big")) + chunks

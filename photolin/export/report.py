@@ -14,10 +14,12 @@ from ..analysis import Analysis
 from ..errors import InputError
 from ..factors import TITLES, Factor, classifiable
 from ..load import LoadOptions
-from ..shape.recover import Shape
-from ..shape.resolved import Resolved
+from ..shape.recover import Shape, check_scale
+from ..shape.resolved import RESIDUALS, Resolved
 
 RESULT, REPORT = "result.npz", "report.json"
+SINGULAR = 1e9
+"""Condition from which a matrix has no normals, as in `normals_from_bases`."""
 
 
 class FileEntry(TypedDict):
@@ -128,22 +130,29 @@ def describe_shape(shape: Shape) -> dict[str, Any]:
 
 
 def restore_resolved(entry: dict[str, Any]) -> Resolved:
-    """What `describe_shape` wrote of the ambiguity."""
-    each = entry["residuals"]
+    """What `describe_shape` wrote of the ambiguity; ValueError where that cannot have been."""
+    each, matrix = entry["residuals"], np.array(entry["matrix"], float).reshape(3, 3)
+    residuals = None if each is None else np.array(each, float).reshape(len(each))
+    numbers = [*matrix.ravel(), float(entry["residual"]), *(() if each is None else each)]
+    if entry["kind"] not in RESIDUALS or not np.isfinite(numbers).all():
+        raise ValueError("neither matrix nor residuals of a shape")
+    if not np.linalg.cond(matrix) < SINGULAR:
+        raise ValueError("a matrix that resolves nothing")
     return Resolved(
-        np.array(entry["matrix"], float).reshape(3, 3),
+        matrix,
         entry["kind"],
         float(entry["residual"]),
         bool(entry["scaled"]),
         str(entry["note"]),
-        None if each is None else np.array(each, float),
+        residuals,
     )
 
 
-def finds_lights(report: Report) -> bool:
-    """Whether the lights of a result were found with its shape, not given with the stack."""
-    told = report.get("shape")
-    return told is not None and told.get("kind") != "lights"
+def restore_scale(entry: dict[str, Any]) -> float | None:
+    """mm per pixel as `describe_shape` wrote it; OptionError where no pixel has that."""
+    px_mm = entry["px_mm"]
+    check_scale(px_mm)
+    return None if px_mm is None else float(px_mm)
 
 
 def describe_reading(options: LoadOptions) -> dict[str, Any]:

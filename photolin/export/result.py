@@ -21,11 +21,11 @@ from .report import (
     describe_analysis,
     describe_reading,
     describe_shape,
-    finds_lights,
     foreign,
     read_report,
     restore_reading,
     restore_resolved,
+    restore_scale,
 )
 
 
@@ -126,7 +126,7 @@ def load_result(path: str | Path) -> Analysis:
             seconds={stage: float(s) for stage, s in report["seconds"].items()},
             title=report["title"],
             confidence=Confidence(**known) if known else None,
-            lights=None if finds_lights(report) else arrays.get("lights"),
+            lights=arrays.get("given_lights" if "normals" in arrays else "lights"),
             files=tuple((entry["path"], entry["sha256"]) for entry in report["files"]),
             notes=tuple(report["notes"]),
             warnings=tuple(report["warnings"]),
@@ -143,16 +143,16 @@ def load_shape(path: str | Path) -> Shape | None:
     """
     file = _result_file(path)
     told, arrays = read_report(file).get("shape"), read_arrays(file)
-    if told is None or "normals" not in arrays:
+    if told is None:
         return None
     try:
         unknown = arrays["mask"] & ~arrays["determined"]
         normals, albedo, depth = arrays["normals"], arrays["albedo"], arrays.get("depth")
         normals[unknown] = albedo[unknown] = np.nan
-        if depth is not None and told["px_mm"] is not None:
-            depth = (depth / np.float32(told["px_mm"])).astype(np.float32)
-        resolved = restore_resolved(told)
-        return Shape(normals, albedo, depth, arrays["lights"], resolved, told["px_mm"])
+        px_mm = restore_scale(told)
+        if depth is not None:
+            depth = (depth / (px_mm or 1)).astype(np.float32)
+        return Shape(normals, albedo, depth, arrays["lights"], restore_resolved(told), px_mm)
     except (KeyError, TypeError, ValueError, PhotolinError) as error:
         raise foreign(file.with_name(REPORT)) from error
 

@@ -25,8 +25,10 @@ and the weight BRIDGE: shadowed grooves do not cut a surface in two."""
 ROUNDS = 30
 STILL = 0.01
 """Root mean square change of depth, pixels, at which rounds end."""
-ROUGH, FINE = 1e-3, 1e-7
+ROUGH, FINE = 1e-3, 1e-6
 """Tolerance of the linear equations in each round, and at the end."""
+STEPS, LAST_STEPS = 4, 100
+"""Most steps of solving them: the next round goes on from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +163,8 @@ def _integrate(
     for turn in range(ROUNDS + 1):
         right, down = across.times(hold_across), downwards.times(hold_downwards)
         given = _pull(right * across.slope) + _pull(down * downwards.slope).T
-        before, z = z, solve_laplace(right, down.T, given, z, tolerance, check)
+        most = LAST_STEPS if tolerance == FINE else STEPS
+        before, z = z, solve_laplace(right, down.T, given, z, tolerance, most, check)
         if progress is not None:
             progress("depth", 1.0 if tolerance == FINE else (turn + 1) / (ROUNDS + 2))
         if tolerance == FINE:

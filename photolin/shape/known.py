@@ -1,6 +1,8 @@
 """What a user knows of a scene: a sphere, points of known normal, lights of some images."""
 
+import re
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,15 @@ import numpy as np
 from ..errors import InputError, OptionError
 from ..load.lights import read_table
 
+FAR = 1e6
+"""Rows and columns beyond which nothing is a pixel."""
 UNIT = 1e-3
 """Difference of all lengths from 1 up to which lights are directions without powers."""
+
+BOTH = (
+    "lights and points or a sphere are known; one of them is accepted, to resolve the ambiguity "
+    "of unknown lights"
+)
 
 Sphere = tuple[float, float, float]
 """Row and column of the centre and radius of an outline, pixels; whole at pixel centres."""
@@ -38,10 +47,7 @@ class Known:
 
     def __post_init__(self) -> None:
         if self.lights and (self.points or self.sphere):
-            raise OptionError(
-                "lights and points or a sphere are known; one of them is accepted, to resolve "
-                "the ambiguity of unknown lights"
-            )
+            raise OptionError(BOTH)
         if self.normals and len(self.normals) != len(self.points):
             raise OptionError(
                 f"{len(self.points)} points and {len(self.normals)} normals; "
@@ -69,7 +75,8 @@ def read_known(
     Args:
         names: of the images, to find those of `lights`.
         points: lines ``row column x y z``, a pixel and its unit normal; or ``row column`` alone,
-            pixels of the sphere.
+            pixels of the sphere. Blanks, tabs, commas or semicolons between; a first line of words
+            is a header, what follows # a remark.
         sphere: row and column of the centre and radius of its outline, pixels.
         lights: lines ``name x y z``, as in .lp files, for some of the images. Lengths are powers
             unless all are 1, or the file is .lp.
@@ -79,6 +86,8 @@ def read_known(
         OptionError: what does not go together, see `Known`.
     """
     if lights is not None:
+        if points is not None:
+            raise OptionError(BOTH)
         images, vectors, powers = _read_some_lights(lights, names)
         return Known(sphere, images=images, lights=vectors, powers=powers)
     if points is None:
@@ -90,21 +99,39 @@ def read_known(
 def _read_points(path: Path) -> tuple[tuple[Point, ...], tuple[Vector, ...]]:
     accepted = "lines of row column x y z, or of row column with the option sphere, are accepted"
     try:
-        lines = [line.split("#")[0].split() for line in path.read_text("utf-8-sig").splitlines()]
-        table = np.array([[float(word) for word in line] for line in lines if line])
+        text = path.read_text("utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:  # not text, no numbers, or lines of different lengths
-        raise InputError(f"{path}: is not a table of numbers; {accepted}") from error
-    if table.ndim != 2 or table.shape[1] not in (2, 5) or not np.isfinite(table).all():
-        raise InputError(f"{path}: does not hold points; {accepted}")
-    pixels = table[:, :2]
-    if (pixels != np.rint(pixels)).any() or (np.abs(pixels) > 1e6).any():
-        raise InputError(f"{path}: rows and columns are not whole; {accepted}")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not text; {accepted}") from error
+    lines = [
+        (n, re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")))
+        for n, line in enumerate(text.splitlines(), 1)
+    ]
+    lines = [(n, words) for n, words in lines if any(words)]
+    if lines and not any(map(_is_number, lines[0][1])):
+        del lines[0]
+    if not lines:
+        raise InputError(f"{path}: holds no points; {accepted}")
+    for n, words in lines:
+        if len(words) not in (2, 5) or not all(map(_is_number, words)):
+            raise InputError(f"{path}, line {n}: {' '.join(words)[:60]!r} is no point; {accepted}")
+        if len(words) != len(lines[0][1]):
+            raise InputError(f"{path}, line {n}: some points have normals, others none; {accepted}")
+        if any(float(word) % 1 or abs(float(word)) > FAR for word in words[:2]):
+            raise InputError(f"{path}, line {n}: row and column are not whole; {accepted}")
+    table = [[float(word) for word in words] for _, words in lines]
     return (
-        tuple((int(row), int(column)) for row, column in pixels),
-        tuple((x, y, z) for x, y, z in table[:, 2:].tolist()) if table.shape[1] == 5 else (),
+        tuple((int(row), int(column)) for row, column, *_ in table),
+        tuple((x, y, z) for _, _, x, y, z in table) if len(table[0]) == 5 else (),
     )
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return isfinite(float(word))
+    except ValueError:
+        return False
 
 
 def _read_some_lights(

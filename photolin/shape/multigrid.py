@@ -17,8 +17,6 @@ SMOOTH = (0.35, 2.0)
 """Eigenvalues of the scaled matrix, at most 2, that smoothing damps; coarser grids do the rest."""
 DEGREE = 3
 """Steps of smoothing before and after the coarser grids."""
-LIMIT = 200
-"""Most steps of conjugate gradients."""
 BLOCK = 2**17
 """Pixels in one piece of work for a thread."""
 
@@ -68,6 +66,7 @@ def solve_laplace(
     given: Floats,
     start: Floats,
     tolerance: float,
+    most: int = 200,
     check: Callable[[], None] = lambda: None,
 ) -> NDArray[np.float64]:
     """Find z with sum over neighbours b of weight_ab (z_a - z_b) = given_a at each pixel a.
@@ -81,10 +80,11 @@ def solve_laplace(
         given: (H,W) float64; its sum over each connected part is 0.
         start: (H,W) float64, a guess.
         tolerance: largest norm of what is left of `given`, relative to its own.
+        most: steps of conjugate gradients at most.
         check: called before each step; may raise.
 
     Returns:
-        (H,W); the best found after LIMIT steps where the tolerance is not reached.
+        (H,W); what is found after `most` steps where the tolerance is not reached.
     """
     grid = _grid(right.astype(np.float64), down.astype(np.float64))
     grids, last = _coarsen(right.astype(np.float32), down.astype(np.float32))
@@ -92,7 +92,7 @@ def solve_laplace(
     rest = grid.residual(given, z)
     enough = tolerance**2 * (given * given).sum()
     nothing, step, before = np.zeros_like(z), np.zeros_like(z), np.inf
-    for _ in range(LIMIT):
+    for _ in range(most):
         check()
         if (rest * rest).sum() <= enough:
             break
@@ -101,7 +101,9 @@ def solve_laplace(
         step = guess + now / before * step
         change = grid.residual(nothing, step)
         length = -now / (step * change).sum()
-        z, rest, before = z + length * step, rest + length * change, now
+        z += length * step
+        rest += length * change
+        before = now
     return z
 
 

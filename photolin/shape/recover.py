@@ -13,6 +13,9 @@ from .grazing import fit_grazing
 from .normals import normals_from_bases
 from .resolved import Resolved
 
+LEAST_MM, MOST_MM = 1e-6, 1e6
+"""Sides of a pixel that are accepted, mm."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -68,13 +71,12 @@ def recover_shape(
         threads: processors to use; the result does not depend on it.
 
     Raises:
-        OptionError: a scale that is not above 0.
+        OptionError: a scale that no pixel has.
         InputError: stack and analysis do not belong together.
         DegenerateError: no pixel has a normal.
         Cancelled: `cancel` said so.
     """
-    if px_mm is not None and not (np.isfinite(px_mm) and px_mm > 0):
-        raise OptionError(f"px_mm is {px_mm:g}; accepted is a number of mm above 0")
+    check_scale(px_mm)
     lights = resolved.lights(analysis.coefficients)
     powers = np.linalg.norm(lights, axis=1)
     bases = fit_grazing(stack, analysis, powers, threads=threads, progress=progress, cancel=cancel)
@@ -83,3 +85,9 @@ def recover_shape(
     if depth:
         z = integrate_normals(normals, analysis.mask, progress=progress, cancel=cancel)
     return Shape(normals, albedo, z, lights, resolved, px_mm)
+
+
+def check_scale(px_mm: float | None) -> None:
+    """Raise OptionError unless `px_mm` is None or a side that a pixel may have."""
+    if px_mm is not None and not LEAST_MM <= px_mm <= MOST_MM:
+        raise OptionError(f"px_mm is {px_mm:g}; accepted are mm from {LEAST_MM:g} to {MOST_MM:g}")

@@ -20,9 +20,9 @@ def relight(shape: Shape, light: tuple[float, float, float]) -> NDArray[np.float
         determined, 0 outside the mask. Cast shadows are not in it.
 
     Raises:
-        OptionError: a light that is zero or not finite.
+        OptionError: a light that is zero, not finite or of absurd power.
     """
-    s = np.array(light, np.float32)
-    if s.shape != (3,) or not np.isfinite(s).all() or not s.any():
-        raise OptionError(f"the light is {light}; x y z, not all zero, is accepted")
+    s = np.array(light, np.float64)
+    if s.shape != (3,) or not 1e-9 < np.abs(s).max() < 1e9:
+        raise OptionError(f"the light is {light}; x y z of a length from 1e-9 to 1e9 is accepted")
     return (shape.albedo * (shape.normals @ s)).astype(np.float32)

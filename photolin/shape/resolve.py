@@ -1,5 +1,7 @@
 """The 3x3 ambiguity from whatever is known of a scene."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,8 @@ NOTHING = Known()
 def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
     """The matrix M with n = M b, by what is known.
 
-    Nothing known: by the lights of the analysis, where it has them; else by integrability.
+    Nothing known: by the lights of the analysis, where it has them; else by integrability. What is
+    known wins over those lights.
 
     Args:
         analysis: linearized bases and coefficients.
@@ -27,6 +30,20 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
         InputError: a point outside the sphere, or as the functions that resolve.
         DegenerateError: what is known does not determine the matrix.
     """
+    if known != NOTHING:
+        found = _from_known(analysis, known)
+        unused = "; the lights given with the stack served the linearization alone"
+        return found if analysis.lights is None else replace(found, note=found.note + unused)
+    if analysis.lights is None:
+        return resolve_by_integrability(
+            analysis.linearized_bases, analysis.mask, analysis.coefficients
+        )
+    # linearization took the coefficients from these lights: there is nothing to fit
+    matrix = np.linalg.inv(analysis.lights[list(analysis.base_images)]).astype(float)
+    return Resolved(matrix, "lights", 0.0, True, "resolved by the lights given with the stack")
+
+
+def _from_known(analysis: Analysis, known: Known) -> Resolved:
     bases, mask = analysis.linearized_bases, analysis.mask
     if known.lights:
         lights = np.array(known.lights)
@@ -35,13 +52,9 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
         rows, columns = np.array(known.points).T
         normals = np.array(known.normals) if known.normals else _on_sphere(known, mask.shape)
         return resolve_from_points(bases, rows, columns, normals)
-    if known.sphere is not None:
-        *centre, radius = known.sphere
-        return resolve_from_sphere(bases, mask, (centre[0], centre[1]), radius)
-    if analysis.lights is not None:
-        every = np.arange(len(analysis.lights))
-        return resolve_from_lights(analysis.coefficients, every, analysis.lights, powers=True)
-    return resolve_by_integrability(bases, mask, analysis.coefficients)
+    assert known.sphere is not None
+    row, column, radius = known.sphere
+    return resolve_from_sphere(bases, mask, (row, column), radius)
 
 
 def _on_sphere(known: Known, shape: tuple[int, int]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """Verbs from linearized images to normals, depth and lights."""
 
-from collections.abc import Mapping
+import os
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -11,26 +11,24 @@ from tyro.conf import Positional
 
 from ..analysis import Analysis, Cancel, Options, Progress
 from ..console import progress_bar, stop_at_ctrl_c
-from ..errors import DegenerateError, InputError
+from ..errors import InputError, OutputError
 from ..export import (
     check_output,
     is_result,
     load_result,
     load_result_source,
     load_result_stack,
-    save_result,
+    result_files,
     write_files,
 )
 from ..export.lights import lights_diligent, lights_lp
-from ..export.maps import Convention
-from ..export.shape import shape_files
+from ..export.surface import surface_files
 from ..load import LoadOptions, load_channels
 from ..pipeline import analyze
 from ..shape.chrome_ball import estimate_lights
 from ..shape.colour import colour_albedo
 from ..shape.known import Sphere, read_known
-from ..shape.mesh import build_mesh
-from ..shape.recover import Shape, recover_shape
+from ..shape.recover import Shape, check_scale, recover_shape
 from ..shape.resolve import NOTHING, Known, resolve_ambiguity
 from ..stack import ImageStack
 from . import COMMAND, read_stack
@@ -47,6 +45,7 @@ def shape(
     some_lights: Path | None = None,
     px_mm: float | None = None,
     directx: bool = False,
+    stack: Path | None = None,
     threads: int | None = None,
 ) -> None:
     """Normals, albedo, depth, mesh and lights of a stack or a result, as files in OUT.
@@ -54,47 +53,47 @@ def shape(
     Without known lights, normals are known up to a 3x3 matrix. It is resolved by points of known
     normal, a sphere in the scene, the lights of some images, or, with none of these, by what makes
     the normals those of a surface, up to the stated convention. Space is x right, y up, z to the
-    camera.
+    camera. A result brings its own analysis and reading options; those given apply to a stack.
 
     Args:
         path: What run accepts as stack, or a folder that run wrote.
-        out: Folder for the files; made when missing.
-        points: Text file of lines: row column x y z, a pixel and its unit normal. With sphere,
-            lines of row column alone are points of that sphere.
+        out: Folder for the files; made when missing. It may be that of the result itself.
+        points: Text file of lines: row column x y z, a pixel of the images as read (inside roi)
+            and its unit normal. With sphere, lines of row column alone are points of that sphere.
         sphere: Row and column of the centre of a sphere in the scene and its radius, pixels.
         some_lights: Lights of some of the images, lines of: name x y z.
         px_mm: Side of a pixel, mm: depth and mesh are then in mm, else in pixels.
         directx: Green of the normal map is y down (DirectX) instead of y up (OpenGL).
+        stack: Where the images of a result are now, if they have moved.
         threads: Processors to use; all when left out. The result does not depend on it.
     """
     check_output(out)
-    stack_path = path
+    check_scale(px_mm)
+    given = is_result(path)
+    was, reading = load_result_source(path) if given else (path, reading)
+    source = stack or was or path if given else path
+    if os.path.realpath(source) == os.path.realpath(out):
+        raise OutputError(f"{out}: holds the images; another folder is accepted")
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
-        if is_result(path):
-            result, images = load_result(path), load_result_stack(path)
-            was, reading = load_result_source(path)
-            stack_path = was or path
+        if given:
+            result, images, seconds = load_result(path), load_result_stack(path, stack), 0.0
         else:
-            images, seconds = read_stack(path, reading, progress)
+            result, (images, seconds) = None, read_stack(path, reading, progress)
+        known = read_known(images.names, points, sphere, some_lights)
+        if result is None:
             result = analyze(images, analysis, threads=threads, progress=progress, cancel=cancel)
             result = replace(result, seconds={"load": seconds, **result.seconds})
-        known = read_known(images.names, points, sphere, some_lights)
         result, found = measure_shape(
             images, result, known, px_mm=px_mm, threads=threads, progress=progress, cancel=cancel
         )
-        colour = measure_colour(stack_path, reading, result, found, progress)
-    save_result(
-        result,
-        out,
-        shape=found,
-        command=COMMAND.get(),
-        stack_path=stack_path,
-        load_options=reading,
-    )
-    files = describe_surface(found, result, colour, convention="directx" if directx else "opengl")
-    write_files(out, files)
+        colour = measure_colour(source, reading, result, found, progress)
+    files = surface_files(found, result, colour, convention="directx" if directx else "opengl")
+    about = {"command": COMMAND.get(), "stack_path": source, "load_options": reading}
+    # all at once: an interruption leaves either all or what was there before
+    write_files(out, result_files(result, shape=found, **about) | files)
     print(f"{result.title}: {found.resolved.note}")
-    print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
+    if found.resolved.residual:
+        print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
     print(f"written result.npz, report.json, {', '.join(files)} to {out}")
 
 
@@ -121,9 +120,11 @@ def measure_shape(
         progress=progress,
         cancel=cancel,
     )
-    took: Mapping[str, float] = analysis.seconds
     seconds = perf_counter() - start
-    took = {**took, "shape": seconds, "total": took["total"] + seconds}
+    # a shape that was there before is replaced, its seconds too
+    stages = {k: s for k, s in analysis.seconds.items() if k not in ("shape", "total")}
+    total = analysis.seconds["total"] - analysis.seconds.get("shape", 0) + seconds
+    took = {**stages, "shape": seconds, "total": total}
     return replace(analysis, seconds=took), found
 
 
@@ -140,32 +141,6 @@ def measure_colour(
     except InputError:
         return None
     return np.stack(planes, axis=2)
-
-
-def describe_surface(
-    found: Shape,
-    analysis: Analysis,
-    colour: NDArray[np.float32] | None = None,
-    convention: Convention = "opengl",
-) -> dict[str, bytes]:
-    """Every file of a shape, name to bytes; albedo is `colour` (H,W,3) where there is one."""
-    mesh = None
-    if found.depth is not None:
-        try:
-            mesh = build_mesh(found.depth, analysis.mask, found.px_mm or 1.0)
-        except DegenerateError:  # single pixels
-            mesh = None
-    return shape_files(
-        analysis.mask,
-        normals=found.normals,
-        albedo=found.albedo if colour is None else colour,
-        depth=found.depth,
-        mesh=mesh,
-        lights=found.lights,
-        names=analysis.names,
-        px_mm=found.px_mm,
-        convention=convention,
-    )
 
 
 def lights(

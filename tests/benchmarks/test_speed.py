@@ -249,7 +249,7 @@ def idle() -> bool:
 def test_the_whole_linearization_follows_a_step_of_T_in_60_ms(
     benchmark: BenchmarkFixture, noise: float
 ) -> None:
-    """24 images of 512 x 512, every pixel. T far below the noise takes longer."""
+    """24 images of 512 x 512, every pixel."""
     stack = render_scene("sphere_cone", size=(512, 512), images=24, noise=noise).stack
     window = Window(0, 512, 0, 512, 1.5)
     assert follow_slider(benchmark, stack, window, analyze(stack)) <= 60

@@ -4,14 +4,17 @@ from collections.abc import Callable
 
 import viser
 
+from ..downloads import SHAPE
 from ..values import choose_option
 
 RESULT = "result (npz and json, zip)"
+SURFACE = "shape (normals, albedo, depth, mesh, lights; zip)"
 KINDS = {
     "masks (PNG, zip)": "masks",
     "label maps (indexed PNG, zip)": "labels",
     "linearized (float32 TIFF)": "linearized",
     RESULT: "result",
+    SURFACE: SHAPE,
 }
 TEXT = """
 - **masks**: for each class a picture that is white where a pixel belongs to it
@@ -21,6 +24,9 @@ TEXT = """
 - **result**: what `photolin run` writes, of all images. result.npz holds labels, coefficients and
   linearized bases as NumPy arrays, report.json how they came about. Unpacked into a folder,
   `photolin inspect` opens them again
+- **shape**: what `photolin shape` writes, once the tab Shape has recovered one. normals.tif,
+  albedo.tif and depth.tif are numbers, the PNGs to look at; mesh.ply and mesh.obj open in MeshLab
+  or Blender; lights.lp is for RTI. x is right, y up, z to the camera
 
 Labels are by T and Ts as the sliders stand, of the method shown. Files go where the browser keeps
 its downloads.
@@ -33,13 +39,15 @@ class ExportView:
 
     def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
-        self._images = gui.add_dropdown("Of", (THIS, ALL), hint="A result is of all images")
+        self._images = gui.add_dropdown(
+            "Of", (THIS, ALL), hint="Result and shape are of all images"
+        )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         gui.add_markdown(TEXT)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
-            self._images.disabled = self._kind.value == RESULT
+            self._images.disabled = self._kind.value in (RESULT, SURFACE)
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:

@@ -80,6 +80,10 @@ class PictureView:
         """Go `by` images on, round the ends."""
         self._image.value = (self._read_image() + by) % self._count
 
+    def go(self, image: int) -> None:
+        """Go to an image."""
+        self._image.value = image
+
     def turn(self, by: int) -> None:
         """Go `by` layers on, round the ends."""
         layers = self._layer.options

@@ -13,10 +13,11 @@ from photolin.shape.known import Known, Sphere
 from photolin.stack import ImageStack
 
 from ..frame import Frame
-from ..readout import describe_shape, escape
+from ..live import is_behind
+from ..readout import describe_shape, escape, shape_status
 from ..state import ViewState
 from ..values import choose_option, clamp_number
-from . import INDENT
+from . import ATTENTION, INDENT
 
 LIGHTS, POINTS, BALL, NOTHING = (
     "the lights of the stack",
@@ -24,9 +25,10 @@ LIGHTS, POINTS, BALL, NOTHING = (
     "a whole sphere",
     "nothing",
 )
+NO_SHAPE = "No shape yet. Say what is known of the scene, then recover it."
 ENOUGH = 5
 """Points from which the shape is recovered at once: the paper's number."""
-RIM, ON, CLEAR = "outline", "points", "clear"
+RIM, ON, SELECT, CLEAR = "outline", "points", "select", "clear"
 Picking = Literal["outline", "points"]
 LARGEST = 1e5
 
@@ -68,10 +70,10 @@ class ShapeView:
         )
         self._pick = gui.add_button_group(
             "Click on picture",
-            (RIM, ON, CLEAR),
+            (RIM, ON, SELECT, CLEAR),
             hint="outline: three clicks or more on the sphere's rim set centre and radius. points: "
-            "clicks on the sphere; from the fifth on, the shape is recovered at once. clear: "
-            "forget what was clicked",
+            "clicks on the sphere; from the fifth on, the shape is recovered at once. select: "
+            "clicks select pixels again. clear: forget what was clicked",
         )
         self._told = gui.add_html("")
         self._px_mm = gui.add_number(
@@ -98,6 +100,7 @@ class ShapeView:
             "lights", True, hint="Arrows from the lights, orange for the image shown (only in 3D)"
         )
         for handle in (self._relief, self._arrows):
+            handle.disabled = True  # until there is a shape
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
@@ -139,8 +142,9 @@ class ShapeView:
         return True
 
     def toggle(self) -> None:
-        """Flat or 3D."""
-        self._relief.value = not self._relief.value
+        """Flat or 3D, once there is a shape."""
+        if not self._relief.disabled:
+            self._relief.value = not self._relief.value
 
     def known(self) -> Known:
         """What is known of the scene, as set here.
@@ -168,8 +172,16 @@ class ShapeView:
 
     def draw(self, frame: Frame) -> None:
         """Say how the shape was found."""
-        text = "No shape yet." if frame.shape is None else describe_shape(frame.shape)
-        self._note.content = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        text = NO_SHAPE if frame.shape is None else describe_shape(frame.shape)
+        note = f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
+        if stale := status_of(frame):
+            note = (
+                '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
+                f'{ATTENTION}">{escape(stale)}</div>{note}'
+            )
+        self._note.content = note
+        for handle in (self._relief, self._arrows):
+            handle.disabled = frame.shape is None
 
     def _outline(self) -> Sphere:
         row, column, radius = (clamp_number(n.value, -LARGEST, LARGEST, 1.0) for n in self._numbers)
@@ -185,9 +197,8 @@ class ShapeView:
 
     def _begin(self, what: str) -> None:
         if what == CLEAR:
-            self._picking, self._rim, self._points = None, (), ()
-        else:
-            self._picking = RIM if what == RIM else ON
+            self._rim, self._points = (), ()
+        self._picking = what if what in (RIM, ON) else None
         self._tell()
         self._changed()
 
@@ -203,10 +214,22 @@ class ShapeView:
         count = len(self._points)
         text = {
             None: "Clicks select pixels.",
-            RIM: f"Click the sphere's rim: {len(self._rim)} of 3 or more.",
-            ON: f"Click points on the sphere: {count} of {ENOUGH} or more.",
+            RIM: f"Click the sphere's rim, three times or more: {len(self._rim)} so far.",
+            ON: f"Click points on the sphere, {ENOUGH} or more, spread wide: {count} so far.",
         }[self._picking]
-        self._told.content = f'<div style="{INDENT};font-size:0.8em">{escape(text)}</div>'
+        self._told.content = (
+            f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
+        )
+
+
+def status_of(frame: Frame) -> str:
+    """That the shape is of another result than recovering again would take, or nothing."""
+    if frame.recovered is None:
+        return ""
+    shown = frame.analysis
+    behind = shown is not None and is_behind(frame.state, shown)
+    wanted = frame.state.thresholds if shown is None or behind else shown.thresholds
+    return shape_status(frame.recovered.analysis, shown, wanted)
 
 
 def outline_of(stack: ImageStack) -> Sphere:

@@ -8,6 +8,7 @@ import viser
 from photolin.factors import Thresholds
 
 from ..frame import Frame
+from ..history import History
 from ..readout import escape, preview_status, threshold_status
 from ..state import ViewState
 from ..values import clamp_number
@@ -17,6 +18,7 @@ STEP = 0.0005
 RANGES = {"T": (0.0005, 0.2), "Ts": (0.0, 0.2)}
 KEY_FACTOR = 1.1
 SUGGEST, LINEARIZE = "suggest T, Ts", "linearize again"
+UNDO, REDO, RESET = "undo", "redo", "reset"
 
 
 class ThresholdView:
@@ -62,7 +64,7 @@ class ThresholdView:
             "(key: S). linearize again: T and Ts enter the linearization itself; until then only "
             "the labels follow the sliders (key: R)",
         )
-        self.set(initial)
+        self.begin(initial)
         for handle in (self._T, self._Ts, self._live):
 
             @handle.on_update
@@ -74,6 +76,49 @@ class ThresholdView:
         @self._buttons.on_click
         async def _(_: viser.GuiEvent) -> None:
             actions[self._buttons.value]()
+
+    def add_steps(self, gui: viser.GuiApi) -> None:
+        """Add the buttons that undo, redo and reset; where there is room for them."""
+        steps = gui.add_button_group(
+            "T and Ts",
+            (UNDO, REDO, RESET),
+            hint="undo, redo: changes of T and Ts, a step for each rest of the sliders (keys: Z, "
+            "Shift-Z). reset: T and Ts of the first result",
+        )
+
+        actions = {UNDO: self.undo, REDO: self.redo, RESET: self.reset}
+
+        @steps.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            actions[steps.value]()
+
+    def begin(self, thresholds: Thresholds) -> None:
+        """Move both sliders to where they start, without a step that could be undone."""
+        self._first, self._history = thresholds, History(thresholds)
+        self.set(thresholds)
+
+    def settle(self, thresholds: Thresholds, rested: bool) -> bool:
+        """Take note of where the sliders have come to rest; whether that is still to come."""
+        if rested:
+            self._history = self._history.settle(thresholds)
+        return self._history.now != thresholds
+
+    def undo(self) -> None:
+        """Go back to where the sliders rested before."""
+        self._go(self._history.undo())
+
+    def redo(self) -> None:
+        """Take back an undo."""
+        self._go(self._history.redo())
+
+    def reset(self) -> None:
+        """Go to T and Ts of the first result; can be undone."""
+        self.set(self._first)
+
+    def _go(self, history: History[Thresholds]) -> None:
+        if history.now != self._history.now:
+            self._history = history
+            self.set(history.now)
 
     def set(self, thresholds: Thresholds) -> None:
         """Move both sliders, and widen them when they do not reach."""

@@ -1,0 +1,79 @@
+"""Two pictures in one: every pixel is from one of them, or their difference."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from photolin import Options, analyze, render_scene
+from photolin.factors import PALETTE, Factor
+from webapp.compare import LINE, differ, lay_over, other_frame, split
+from webapp.frame import Frame, compose
+from webapp.state import ViewState
+
+STACK = render_scene("sphere_cone", size=(24, 30), images=8).stack
+RESULTS = {
+    "robust": analyze(STACK),
+    "classification": analyze(STACK, Options(method="classification", samples=50)),
+}
+
+
+def frame(**state: object) -> Frame:
+    return compose(STACK, RESULTS, replace(ViewState(), **state))  # type: ignore[arg-type]
+
+
+def pictures() -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(0)
+    one, two = rng.integers(0, 256, (2, 10, 20, 3)).astype(np.uint8)
+    return one, two
+
+
+@pytest.mark.parametrize("divider", [0.0, 0.1, 0.5, 0.98, 1.0])
+def test_left_of_the_line_is_one_picture_and_right_of_it_the_other(divider: float) -> None:
+    one, two = pictures()
+    both = split(one, two, divider)
+    at = round(divider * 20)
+    np.testing.assert_array_equal(both[:, : max(at - 1, 0)], one[:, : max(at - 1, 0)])
+    np.testing.assert_array_equal(both[:, at:], two[:, at:])
+    if 0 < at < 20:
+        assert (both[:, at - 1] == LINE).all()
+    else:
+        np.testing.assert_array_equal(both, one if at else two)
+
+
+def test_the_difference_is_symmetric_and_black_where_pictures_are_equal() -> None:
+    one, two = pictures()
+    np.testing.assert_array_equal(differ(one, two), differ(two, one))
+    assert (differ(one, one) == 0).all()
+    np.testing.assert_array_equal(differ(one, two), np.abs(one.astype(int) - two))
+
+
+def test_labels_lie_over_a_grey_picture_as_in_the_overlay() -> None:
+    f = frame(opacity=1.0)
+    assert f.labels is not None
+    over = lay_over(np.full((24, 30), 77, np.uint8), f, hidden=False)
+    for factor in Factor:
+        assert (over[f.labels == factor] == PALETTE[factor]).all()
+    few = lay_over(np.full((24, 30), 77, np.uint8), frame(shown=frozenset({Factor.CAST})), False)
+    assert (few[f.labels == Factor.DIFFUSE] == 77).all()
+    assert (few[f.labels == Factor.CAST] != 77).any()
+    assert (lay_over(np.full((24, 30), 77, np.uint8), f, hidden=True) == 77).all()
+
+
+def test_half_opaque_labels_mix_with_the_picture() -> None:
+    f = frame(opacity=0.5)
+    assert f.labels is not None
+    over = lay_over(np.full((24, 30), 100, np.uint8), f, hidden=False)
+    cast = f.labels == Factor.CAST
+    expected = np.array(PALETTE[Factor.CAST]) * 0.5 + 50
+    assert np.abs(over[cast].astype(float) - expected).max() <= 1
+
+
+def test_compared_is_the_method_beside_where_there_is_one() -> None:
+    f = frame(beside="classification")
+    other = other_frame(f, "labels")
+    assert other.analysis is RESULTS["classification"]
+    np.testing.assert_array_equal(other.labels, f.beside_labels)
+    alone = other_frame(frame(), "residual")
+    assert alone.analysis is RESULTS["robust"]
+    assert alone.state.layer == "residual"

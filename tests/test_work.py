@@ -1,0 +1,214 @@
+"""The long work of a tab, without a tab."""
+
+import io
+import threading
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from photolin.analysis import Options
+from photolin.errors import Cancelled, InputError, OptionError
+from photolin.export import result_files
+from photolin.export.surface import surface_files
+from photolin.factors import Thresholds
+from photolin.pipeline import analyze
+from photolin.shape.known import Known
+from photolin.shape.resolve import resolve_ambiguity
+from photolin.synthetic import render_scene
+from webapp import work as module
+from webapp.runs import Runs
+from webapp.state import ViewState
+from webapp.work import EMPTY, Desk, Work, cancelling
+
+SCENE = render_scene("sphere_obstacles", size=(48, 64), images=9)
+STACK = replace(SCENE.stack, lights=SCENE.truth.lights * SCENE.truth.power[:, None])
+OPTIONS = Options(T=0.05, Ts=0.02, samples=50)
+RESULT = analyze(STACK, OPTIONS)
+
+
+@dataclass
+class Tab:
+    """What a tab was told."""
+
+    state: ViewState = field(default_factory=ViewState)
+    begun: list[Thresholds] = field(default_factory=list)
+    moved: list[Thresholds] = field(default_factory=list)
+    busy: list[bool] = field(default_factory=list)
+    stages: list[str] = field(default_factory=list)
+    sent: dict[str, bytes] = field(default_factory=dict)
+    shaped: int = 0
+    told: list[Exception] = field(default_factory=list)
+    refused: int = 0
+    rested: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+
+    def desk(self) -> Desk:
+        return Desk(
+            read=lambda: self.state,
+            begin=self.begun.append,
+            move=self.moved.append,
+            busy=self.busy.append,
+            progress=lambda stage, _: self.stages.append(stage),
+            send=self.sent.__setitem__,
+            shaped=self._shape,
+            tell=self.told.append,
+            refuse=self._refuse,
+            changed=self.rested.release,
+        )
+
+    def _shape(self) -> None:
+        self.shaped += 1
+
+    def _refuse(self) -> None:
+        self.refused += 1
+
+    def wait(self) -> None:
+        assert self.rested.acquire(timeout=20), "the work did not end"
+
+
+@pytest.fixture
+def tab() -> Tab:
+    return Tab()
+
+
+@pytest.fixture
+def work(tab: Tab) -> Iterator[Work]:
+    made = Work(Runs(STACK, OPTIONS, RESULT), result_files, RESULT.thresholds, tab.desk())
+    yield made
+    made.close()
+
+
+def test_a_shape_is_kept_with_the_result_it_is_of(work: Work, tab: Tab) -> None:
+    assert work.recovered is None
+    work.recover(Known(), given_lights=True, px_mm=0.5)
+    tab.wait()
+    assert tab.told == []
+    assert tab.shaped == 1
+    assert tab.busy == [True, False]
+    assert work.recovered is not None
+    assert work.recovered.analysis is RESULT
+    assert work.recovered.shape.unit == "mm"
+    expected = resolve_ambiguity(RESULT)
+    assert expected.kind == "lights"
+    assert np.array_equal(work.recovered.shape.resolved.matrix, expected.matrix)
+
+
+def test_the_lights_of_the_stack_are_used_only_when_asked_for(work: Work, tab: Tab) -> None:
+    work.recover(Known(), given_lights=False, px_mm=None)
+    tab.wait()
+    assert work.recovered is not None
+    assert work.recovered.shape.resolved.kind == "integrability"
+
+
+def test_a_shape_while_a_preview_is_shown_is_of_a_run_by_its_thresholds(
+    work: Work, tab: Tab
+) -> None:
+    tab.state = replace(tab.state, T=0.031)
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert work.recovered is not None
+    assert work.recovered.analysis.thresholds == Thresholds(0.031, 0.02)
+    assert work.results["robust"] is work.recovered.analysis
+
+
+def test_without_following_a_shape_is_of_the_result_on_screen(work: Work, tab: Tab) -> None:
+    tab.state = replace(tab.state, T=0.031, live=False)
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert work.recovered is not None
+    assert work.recovered.analysis is RESULT
+
+
+def test_what_does_not_work_is_told_and_the_earlier_shape_kept(work: Work, tab: Tab) -> None:
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    earlier = work.recovered
+    work.recover(Known((24.0, 32.0, 20.0), ((24, 32), (20, 30))), given_lights=False, px_mm=None)
+    tab.wait()
+    (error,) = tab.told
+    assert isinstance(error, InputError)
+    assert "2 points of known normal; at least 4 are needed" in str(error)
+    assert work.recovered is earlier
+    assert tab.busy[-1] is False
+
+
+def test_a_cancelled_shape_says_what_is_there(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def hold(*_: object, cancel: object, **__: object) -> None:
+        begun.set()
+        assert ended.wait(10)
+        assert callable(cancel)
+        assert cancel()
+        raise Cancelled("depth was cancelled")
+
+    monkeypatch.setattr(module, "recover_shape", hold)
+    work.recover(Known(), given_lights=True, px_mm=None)
+    assert begun.wait(10)
+    work.suggest()
+    assert tab.refused == 1
+    work.stop()
+    ended.set()
+    tab.wait()
+    assert [str(error) for error in tab.told] == ["shape cancelled; there is none"]
+    assert (work.recovered, tab.shaped) == (None, 0)
+
+
+def test_files_of_a_shape_are_those_of_the_command_line(work: Work, tab: Tab) -> None:
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    work.download("shape", everything=False)
+    tab.wait()
+    assert tab.told == []
+    (name,) = tab.sent
+    assert name == "sphere_obstacles_shape.zip"
+    assert work.recovered is not None
+    expected = surface_files(work.recovered.shape, work.recovered.analysis)
+    with zipfile.ZipFile(io.BytesIO(tab.sent[name])) as archive:
+        found = {each: archive.read(each) for each in archive.namelist()}
+    assert set(found) == set(expected)
+    assert {"normals.tif", "albedo.tif", "depth.tif", "mesh.ply", "lights.lp"} <= set(found)
+    assert found["depth.tif"] == expected["depth.tif"]
+    assert found["lights.lp"] == expected["lights.lp"]
+
+
+def test_files_of_a_shape_that_is_not_there_are_refused_with_the_way_to_it(
+    work: Work, tab: Tab
+) -> None:
+    work.download("shape", everything=True)
+    tab.wait()
+    assert tab.sent == {}
+    (error,) = tab.told
+    assert isinstance(error, OptionError)
+    assert str(error) == "there is no shape yet; recover one in the tab Shape (key: N)"
+
+
+def test_without_a_result_there_is_nothing_to_recover_from(tab: Tab) -> None:
+    work = Work(Runs(STACK, OPTIONS), result_files, RESULT.thresholds, tab.desk())
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert [str(e) for e in tab.told] == ["there is no result yet; linearize first"]
+
+
+def test_the_first_result_moves_sliders_that_nobody_has_touched(tab: Tab) -> None:
+    tab.state = ViewState(T=0.07, Ts=0.03)
+    work = Work(Runs(STACK, OPTIONS), result_files, Thresholds(0.07, 0.03), tab.desk())
+    work.ensure(tab.state)
+    tab.wait()
+    assert tab.begun == [work.results["robust"].thresholds]
+    work.ensure(tab.state)
+    work.linearize()
+    tab.wait()
+    assert work.results["robust"].thresholds == Thresholds(0.07, 0.03)
+    assert len(tab.begun) == 1
+    assert tab.moved == []
+
+
+def test_a_cancelled_stage_is_told_as_what_the_user_began() -> None:
+    expected = f"^linearization cancelled; {EMPTY}$"
+    with pytest.raises(Cancelled, match=expected), cancelling("linearization", EMPTY):
+        raise Cancelled("coefficients was cancelled")

@@ -1,0 +1,97 @@
+// Pointer and keys: which pixel is meant, and who gets a key, the picture or a widget.
+
+function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, keyId, send, sender, peek }) {
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
+  const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
+
+  const { canvas } = viewer;
+  const hover = sender(hoverId);
+
+  let reports = 0;
+  /** Send an event, numbered, because the same value again would be no change of the widget. */
+  const report = (uuid, text) => text && send(uuid, `${++reports} ${text}`);
+
+  /** The pixel under the middle of the device pixel that the pointer is on, "" beside the picture.
+   *
+   * In 3D the ray through there: "ray column,row,height,..." of the eye and a direction, pixels. */
+  function pixelUnder(event) {
+    if (!camera.placed()) return "";
+    const box = canvas.getBoundingClientRect();
+    const middle = 0.5 / window.devicePixelRatio;
+    const [x, y] = [event.clientX - box.left + middle, event.clientY - box.top + middle];
+    if (camera.isOrbiting()) {
+      const numbers = [...camera.eye(), ...camera.direction(x, y)];
+      return `ray ${numbers.map((n) => n.toFixed(6)).join(",")}`;
+    }
+    const { scale, left, top } = camera.similarity();
+    const row = Math.floor((y - top) / scale);
+    const column = Math.floor((x - left) / scale);
+    const inside = row >= 0 && row < rows && column >= 0 && column < columns;
+    return inside ? `${row},${column}` : "";
+  }
+
+  let pressed = null; // pointerdown that may become a click
+
+  function release(event) {
+    const moved = pressed && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY);
+    if (pressed && moved <= CLICK_PIXELS) report(pickId, pixelUnder(event));
+    pressed = null;
+  }
+
+  const isList = (widget) => widget.getAttribute?.("role") === "combobox";
+
+  /** Whether a text or number is being typed there, or something chosen from an open list. */
+  function isBusy(widget) {
+    if (isList(widget)) return widget.getAttribute("aria-expanded") === "true";
+    const kind = widget.tagName === "INPUT" ? widget.type : widget.tagName;
+    return widget.isContentEditable || /^(TEXTAREA|SELECT|text|number|search)$/.test(kind);
+  }
+
+  /** Whether the focused widget uses this key itself. */
+  function isForWidget({ key, target }) {
+    if (isBusy(target)) return true;
+    if (target === document.body || target === canvas) return false;
+    const movable = /^(slider|tab|radio)$/.test(target.getAttribute?.("role") ?? target.type);
+    return key === " " || key === "Enter" || key === "Tab" || (movable && key.startsWith("Arrow"));
+  }
+
+  /** Whoever works with the pointer, or has chosen from a list, has the keys for the picture. */
+  function giveFocusBack() {
+    const focused = document.activeElement;
+    if (focused && !isBusy(focused)) focused.blur(); // Tab still goes on from there
+  }
+
+  const local = { f: camera.fit, g: camera.oneToOne, " ": () => peek(true) };
+
+  function onKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
+    const action = local[event.key.toLowerCase()];
+    const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
+    if (!action && !reported) return;
+    if (isList(event.target)) {
+      event.stopPropagation(); // it would open again
+      giveFocusBack();
+    }
+    if (!action) return report(keyId, event.key);
+    event.preventDefault();
+    if (!event.repeat && camera.placed()) action();
+  }
+
+  listen(canvas, "pointermove", (event) => hover(pixelUnder(event)));
+  listen(canvas, "pointerleave", () => hover(""));
+  listen(canvas, "pointerdown", (event) => {
+    pressed = event.isPrimary && event.button === 0 ? event : null;
+  });
+  listen(canvas, "pointerup", release);
+  listen(canvas, "dblclick", () => camera.placed() && camera.fit());
+  // After the widget has had the click; those made with the keyboard have no detail.
+  listen(window, "click", ({ detail }) => detail > 0 && setTimeout(giveFocusBack), true);
+  listen(window, "keydown", onKey, true);
+  listen(window, "keyup", (event) => event.key === " " && peek(false), true);
+  listen(window, "blur", () => peek(false));
+  // viser moves its camera by listeners on `document`, even while a slider has the focus: stop the
+  // keys one step below, after every widget has had them.
+  listen(document.documentElement, "keydown", (event) => {
+    if (CAMERA_KEYS.test(event.code)) event.stopPropagation();
+  });
+}
