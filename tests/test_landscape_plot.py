@@ -3,6 +3,7 @@
 import base64
 import io
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -39,7 +40,7 @@ LAND = Landscape(
 HERE = Thresholds(0.02, 0.01)
 
 
-def drawing(land: Landscape = LAND, quantity="undefined", present=HERE, suggested=(3, 8)):
+def drawing(land: Landscape = LAND, quantity: Any = "undefined", present=HERE, suggested=(3, 8)):
     return ElementTree.fromstring(plot_landscape(land, quantity, present, suggested, "the-map"))
 
 

@@ -27,6 +27,7 @@ from ..landscape_plot import (
     thresholds_at,
 )
 from ..readout import escape
+from ..values import choose_option
 from . import INDENT
 
 KEPT = 4
@@ -205,7 +206,8 @@ class LandscapeView:
             if wanted is self._declined:
                 return escape("There is no map of this result; open this part again to make it.")
             return escape("The map is being made.")
-        quantity = next((q for q in self._offered if q == self._quantity.value), "change")
+        chosen = choose_option(self._quantity.value, self._offered, "change")
+        quantity = self._offered[self._offered.index(chosen)]
         present, ring = frame.state.thresholds, plateau(landscape)
         plot = plot_landscape(landscape, quantity, present, ring, self._map_id)
         sentence = describe_cell(landscape, quantity, present, ring)
