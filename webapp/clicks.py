@@ -1,0 +1,92 @@
+"""Clicks on parts of the panel, as fractions of their size, and whether they are in view.
+
+Pictures in viser's panel tell no clicks, and tabs do not tell when they are opened. `clicks.js`
+looks for elements by id in the page and writes what happens into one hidden field. The elements may
+be replaced at any time, or be made later.
+
+Callbacks run one at a time on viser's event loop, which all tabs share: they must return at once.
+"""
+
+import functools
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import viser
+
+from .viser_internals import call_javascript, run_javascript, widget_id
+
+
+class Click(NamedTuple):
+    """A click on an element."""
+
+    name: str
+    x: float
+    """From its left border to its right, 0 to 1."""
+    y: float
+    """From its upper border to its lower, 0 to 1."""
+
+
+class Sight(NamedTuple):
+    """An element came into view or went out of it."""
+
+    name: str
+    shown: bool
+
+
+class Clicks:
+    """The elements of one client's page that are watched; freed with the client."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._client = client
+        self._clicked: dict[str, Callable[[float, float], None]] = {}
+        self._seen: dict[str, Callable[[bool], None]] = {}
+        self._field = client.gui.add_text("clicks", "", visible=False)
+        run_javascript(client, _javascript())
+        call_javascript(client, "window.openClicks", {"fieldId": widget_id(self._field)})
+
+        @self._field.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            match event_in_text(self._field.value):
+                case Click(name, x, y) if name in self._clicked:
+                    self._clicked[name](x, y)
+                case Sight(name, shown) if name in self._seen:
+                    self._seen[name](shown)
+
+    def watch(
+        self, name: str, clicked: Callable[[float, float], None], seen: Callable[[bool], None]
+    ) -> str:
+        """Call back with clicks on an element, and with whether it is in view when that changes.
+
+        Args:
+            name: small letters and dashes, up to 40.
+            clicked: called with x and y, fractions of the element's width and height, from its
+                upper left corner.
+            seen: called with true when the element is in view, false when it is not any more.
+
+        Returns:
+            The id to give to the element, an HTML or SVG one.
+        """
+        self._clicked[name], self._seen[name] = clicked, seen
+        call_javascript(self._client, "window.photolinClicks.watch", name)
+        return f"photolin-{name}"
+
+
+def event_in_text(text: str) -> Click | Sight | None:
+    """What the page wrote as "number name x,y", "number name shown" or "... hidden", or None."""
+    number = r"([01]\.[0-9]{1,6})"
+    found = re.fullmatch(
+        rf"[0-9]{{1,9}} ([a-z-]{{1,40}}) (?:{number},{number}|(shown|hidden))", text, re.ASCII
+    )
+    if found is None:
+        return None
+    if found[4] is not None:
+        return Sight(found[1], found[4] == "shown")
+    x, y = float(found[2]), float(found[3])
+    return Click(found[1], x, y) if x <= 1 and y <= 1 else None
+
+
+@functools.cache
+def _javascript() -> str:
+    return Path(__file__).with_name("clicks.js").read_text(encoding="utf-8")
