@@ -22,6 +22,7 @@ from photolin.factors import LETTERS, Factor, Thresholds
 
 from .canvas import Canvas, Pixel, Window
 from .catch_up import CatchUp
+from .clicks import Clicks
 from .downloads import Pack
 from .frame import Frame, compose
 from .live import Live, Preview
@@ -32,6 +33,7 @@ from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
 from .views.help import HelpView
+from .views.landscape import LandscapeView
 from .views.legend import LegendView
 from .views.picture import PictureView
 from .views.pixel import PixelView
@@ -81,6 +83,7 @@ class Session:
         """Stop all work for the tab."""
         self._closed.set()
         self._work.close()
+        self._landscape.close()
         self._catch_up.close()
         self._wake.set()
 
@@ -109,6 +112,10 @@ class Session:
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self._thresholds.add_steps(gui)
             self._samples = SamplesView(gui, self._stack, self._resample, self._set_Ts)
+        with tabs.add_tab("Map", viser.Icon.MAP):
+            self._landscape = LandscapeView(
+                gui, Clicks(client), self._stack, self._move, self._tell
+            )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
@@ -122,7 +129,7 @@ class Session:
         both = (self._picture, self._thresholds, self._pixel_view)
         self._readers = (self._run, *both, self._legend, self._compare, self._shape_view)
         self._drawers = (
-            *(*both, self._samples, self._shares, self._summary),
+            *(*both, self._samples, self._landscape, self._shares, self._summary),
             *(self._diagnosis, self._compare, self._shape_view),
         )
         self._keys = self._bind_keys()
