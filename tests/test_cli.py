@@ -206,8 +206,11 @@ def test_evaluate_needs_the_truth_of_a_result(result: Path, capsys) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "Expected one of {run, inspect, shape, export, evaluate, lights, synth, info}"),
-        (["fly"], "fly is no verb; accepted are run, inspect, shape, export, evaluate, lights, "),
+        (
+            [],
+            "Expected one of {run, inspect, shape, export, report, evaluate, lights, synth, info}",
+        ),
+        (["fly"], "fly is no verb; accepted are run, inspect, shape, export, report, evaluate, "),
         (["Run", "a", "b"], "Run is no verb; accepted are run, "),
         (["--fly"], "--fly; photolin --help lists"),
         (["run"], "STACK OUT; photolin run --help lists"),

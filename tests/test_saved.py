@@ -9,8 +9,8 @@ import pytest
 
 from photolin.errors import InputError, OptionError
 from photolin.factors import Factor
-from webapp.saved import MAX_BYTES, MAX_PINS, Saved, decode_saved, encode_saved
-from webapp.state import ViewState
+from webapp.saved import MAX_BYTES, Saved, decode_saved, encode_saved
+from webapp.state import MOST_PINS, ViewState
 from webapp.values import MAX_TEXT
 
 SHAPE = (10, 20, 30)
@@ -25,14 +25,18 @@ STATE = ViewState(
     opacity=0.25,
     shown=frozenset({Factor.CAST, Factor.UNDEFINED}),
     outlines=True,
+    against="labels",
+    divider=0.125,
+    difference=True,
     relief=True,
     arrows=False,
     light=(0.1, -0.2),
     pixel=(19, 29),
+    pins=((0, 0), (19, 29), (5, 6), (0, 1)),
     gain=3.5,
     encoding="exact (PNG)",
 )
-FULL = Saved(STATE, ((0, 0), (19, 29), (5, 6), (0, 1)), (3, 8), "hé <b>\n\0 \u2028 \U0001f600")
+FULL = Saved(STATE, (3, 8), "hé <b>\n\0 \u2028 \U0001f600")
 
 
 def given(**entries: Any) -> bytes:
@@ -69,6 +73,9 @@ def test_entries_that_are_missing_or_unknown_do_not_matter() -> None:
         ("Ts", -3.0, 0.0),
         ("opacity", 1e9, 1.0),
         ("opacity", -1, 0.0),
+        ("divider", 7, 1.0),
+        ("pins", [[0, 0], [20, 0], [-1, 5], [3, 4], [10**30, 1], [0, 0]], ((0, 0), (3, 4))),
+        ("pins", [[0, k] for k in range(9)], tuple((0, k) for k in range(MOST_PINS))),
         ("gain", 1e300, 1e6),
         ("gain", 0, 1e-3),
         ("image", 10**60, 9),
@@ -93,6 +100,8 @@ def test_numbers_are_brought_into_their_range(name: str, value: object, becomes:
         *(("method", value) for value in ("best", 0)),
         *(("shown", value) for value in ([9], ["D"], 3, [1, None])),
         *(("pixel", value) for value in ([1], [1, 2, 3], [1.5, 2], "12", {"0": 1})),
+        *(("pins", value) for value in (3, [[1, 2], [3]], [1, 2], [["1", 2]], None)),
+        *(("against", value) for value in ("heat", 1)),
         *(("light", value) for value in ([1, 1], [10**300, 0], [0, "0"], None)),
         *(("live", value) for value in (1, "yes", None)),
         ("gain", "bright"),
@@ -112,8 +121,6 @@ def test_an_entry_that_cannot_be_is_as_at_first_and_told(name: str, value: objec
     ("name", "value", "words"),
     [
         ("state", [1], "Expected `object`"),
-        ("pins", 3, "Expected `array`"),
-        ("pins", [[1, 2], [3]], "length 2"),
         ("notes", 3, "Expected `str`"),
         ("exclusions", ["3"], "Expected `int`"),
         ("exclusions", [3, 3], "twice"),
@@ -124,26 +131,19 @@ def test_an_entry_that_cannot_be_is_as_at_first_and_told(name: str, value: objec
     ],
 )
 def test_what_is_not_of_the_view_is_judged_too(name: str, value: object, words: str) -> None:
-    entries = {"state": {"T": 0.3}, "notes": "kept", "pins": [[1, 2]]} | {name: value}
+    entries = {"state": {"T": 0.3}, "notes": "kept"} | {name: value}
     saved, told = decode_saved(given(**entries), SHAPE)
     assert len(told) == 1
     assert words in told[0]
     assert saved.notes == ("" if name == "notes" else "kept")
-    assert saved.pins == (() if name == "pins" else ((1, 2),))
     assert saved.state == ViewState(T=0.05 if name == "state" else 0.3)
     assert saved.exclusions == ()
 
 
-def test_pins_outside_the_picture_go_and_others_stay() -> None:
-    pins = [[0, 0], [20, 0], [-1, 5], [3, 4], [10**30, 1]]
-    assert decode_saved(given(pins=pins), SHAPE) == (Saved(pins=((0, 0), (3, 4))), ())
-
-
-def test_too_many_pins_and_too_long_notes_are_cut_and_told() -> None:
-    saved, told = decode_saved(given(pins=[[0, k] for k in range(9)], notes="x" * 9999), SHAPE)
-    assert saved.pins == tuple((0, k) for k in range(MAX_PINS))
+def test_notes_that_are_too_long_are_cut_and_told() -> None:
+    saved, told = decode_saved(given(notes="x" * 9999), SHAPE)
     assert saved.notes == "x" * MAX_TEXT
-    assert told == ("session: 4 pins and 4096 characters of notes are kept",)
+    assert told == ("session: the first 4096 characters of the notes are kept",)
 
 
 def test_the_image_counts_those_that_are_left() -> None:
@@ -162,7 +162,7 @@ def test_the_image_counts_those_that_are_left() -> None:
         (b'{"version":1,"state":{"T":1e999}}', "no session of photolin"),
         (b'{"version":1,"state":{"T":Infinity}}', "no session of photolin"),
         (b'{"version":1,"notes":"\\ud800"}', "no session of photolin"),
-        (b'{"version":1,"pins":' + b"[" * 200_000, "no session of photolin"),
+        (b'{"version":1,"notes":' + b"[" * 200_000, "no session of photolin"),
         (b"{}", "no session of version 1"),
         (given(version=2), "no session of version 1"),
         (given(version="1"), "no session of version 1"),
@@ -188,15 +188,13 @@ def test_random_damage_never_raises_anything_else() -> None:
             refused += 1
             continue
         assert saved.state.image < SHAPE[0]
-        assert len(saved.pins) <= MAX_PINS
+        assert len(saved.state.pins) <= MOST_PINS
     assert 500 < refused < 2000
 
 
 def test_no_session_holds_more_than_a_file_can() -> None:
-    longest = Saved(pins=((1, 2),) * MAX_PINS, exclusions=tuple(range(5000)), notes="\0" * MAX_TEXT)
+    longest = Saved(STATE, tuple(range(5000)), "\0" * MAX_TEXT)
     assert len(encode_saved(longest)) < MAX_BYTES
-    with pytest.raises(OptionError, match="5 pins; up to 4"):
-        Saved(pins=((0, 0),) * 5)
     with pytest.raises(OptionError, match="notes of 4097 characters; up to 4096"):
         Saved(notes="x" * (MAX_TEXT + 1))
     with pytest.raises(OptionError, match="exclude names image 1 twice"):

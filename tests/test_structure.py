@@ -25,7 +25,7 @@ FLOORS = (
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),
-    ("console",),
+    ("kinds", "console"),
     ("verbs",),
     ("cli",),
     ("__init__", "__main__"),

@@ -10,21 +10,18 @@ from photolin.errors import InputError, OptionError
 from photolin.load import LoadOptions
 from photolin.stack import MIN_IMAGES
 
-from .state import ViewState
+from .state import MOST_PINS, ViewState
 from .values import MAX_TEXT
-
-Pixel = tuple[int, int]
-"""(row, column)"""
 
 VERSION = 1
 """Of the file's layout; files of another are not read."""
-MAX_PINS = 4
 MAX_BYTES = 1 << 18
 """Of a file; far more than the longest notes take."""
 RANGES: dict[str, tuple[float, float]] = {
     "T": (0.0, 1.0),
     "Ts": (0.0, nextafter(1, 0)),
     "opacity": (0.0, 1.0),
+    "divider": (0.0, 1.0),
     "gain": (1e-3, 1e6),
 }
 """Where numbers of a file are brought to; a T of 0 is then refused, as nothing near it is meant."""
@@ -35,18 +32,14 @@ class Saved:
     """What a new tab needs to look like the one before."""
 
     state: ViewState = field(default_factory=ViewState)
-    """T, Ts, method, image, layer, selected pixel and how they are shown; its image counts those
-    that are left."""
-    pins: tuple[Pixel, ...] = ()
-    """(row, column) of pixels to compare, MAX_PINS at most."""
+    """T, Ts, method, image, layer, selected pixel, pins and how all is shown; its image counts
+    those that are left."""
     exclusions: tuple[int, ...] = ()
     """Images left out, as in `LoadOptions.exclude`: numbers of the whole stack."""
     notes: str = ""
     """The user's own words, MAX_TEXT characters at most; any text."""
 
     def __post_init__(self) -> None:
-        if len(self.pins) > MAX_PINS:
-            raise OptionError(f"{len(self.pins)} pins; up to {MAX_PINS} are accepted")
         if len(self.notes) > MAX_TEXT:
             raise OptionError(
                 f"notes of {len(self.notes)} characters; up to {MAX_TEXT} are accepted"
@@ -64,8 +57,9 @@ def encode_saved(saved: Saved) -> bytes:
 def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple[str, ...]]:
     """The session of a file, whatever it holds.
 
-    Numbers beyond their range are brought into it; images and pixels that the stack does not have
-    are dropped, as it may have changed. What else cannot be is as in a new session.
+    Numbers beyond their range are brought into it; images, pixels and pins that the stack does not
+    have are dropped, as it may have changed, and so are pins beyond the most there can be. What
+    else cannot be is as in a new session.
 
     Args:
         shape: (K,H,W) of the whole stack.
@@ -87,10 +81,9 @@ def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple
             return default
 
     K, H, W = shape
-    inside = [p for p in take("pins", list[Pixel], []) if 0 <= p[0] < H and 0 <= p[1] < W]
     notes = take("notes", str, "")
-    if len(inside) > MAX_PINS or len(notes) > MAX_TEXT:
-        told.append(f"session: {MAX_PINS} pins and {MAX_TEXT} characters of notes are kept")
+    if len(notes) > MAX_TEXT:
+        told.append(f"session: the first {MAX_TEXT} characters of the notes are kept")
     exclusions = take("exclusions", tuple[int, ...], ())
     try:
         exclusions = LoadOptions(exclude=exclusions).exclude
@@ -100,8 +93,7 @@ def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple
         told.append(_sentence("exclusions", error))
         exclusions = ()
     state, faults = _read_state(take("state", dict, {}), (K - len(exclusions), H, W))
-    saved = Saved(state, tuple(inside[:MAX_PINS]), exclusions, notes[:MAX_TEXT])
-    return saved, (*told, *faults)
+    return Saved(state, exclusions, notes[:MAX_TEXT]), (*told, *faults)
 
 
 def _entries(data: bytes) -> dict[str, Any]:
@@ -122,6 +114,10 @@ def _read_state(
     """Each entry of a ViewState on its own, so that a bad one costs no other."""
     K, H, W = shape
     ranges = {**RANGES, "image": (0, K - 1)}
+
+    def inside(pixel: tuple[int, int]) -> bool:
+        return 0 <= pixel[0] < H and 0 <= pixel[1] < W
+
     state, told = ViewState(), []
     for name, kind in get_type_hints(ViewState).items():
         if name not in entries:
@@ -131,11 +127,13 @@ def _read_state(
             if name in ranges and value is not None:
                 low, high = ranges[name]
                 value = min(max(value, low), high)
+            elif name == "pixel" and value is not None:
+                value = value if inside(value) else None
+            elif name == "pins" and value is not None:
+                value = tuple(dict.fromkeys(filter(inside, value)))[:MOST_PINS]
             state = replace(state, **{name: value})
         except (msgspec.ValidationError, OptionError, OverflowError) as error:
             told.append(_sentence(name, error))
-    if state.pixel is not None and not (0 <= state.pixel[0] < H and 0 <= state.pixel[1] < W):
-        state = replace(state, pixel=None)
     return state, told
 
 
