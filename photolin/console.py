@@ -8,25 +8,15 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
-from dataclasses import replace
-from functools import reduce
-from operator import or_
-from types import NoneType
-from typing import get_args
 
 import tyro
 from tqdm import tqdm
-from tyro.constructors import (
-    ConstructorRegistry,
-    PrimitiveConstructorSpec,
-    PrimitiveTypeInfo,
-    UnsupportedTypeAnnotationError,
-)
 
 from .analysis import Analysis, Cancel, Progress
 from .compiling import COMPILING, tell_compiling
 from .errors import OptionError, PhotolinError
 from .factors import OUTSIDE, TITLES
+from .kinds import KINDS
 from .stack import ImageStack
 
 Call = Callable[[], None]
@@ -38,8 +28,6 @@ STYLE = (
     tyro.conf.OmitArgPrefixes,
     tyro.conf.PositionalMetavarFromFieldName,
 )
-KINDS = ConstructorRegistry()
-"""How tyro is to read what it would read or show badly."""
 
 
 def parse(verbs: dict[str, Callable[..., Call]], arguments: Sequence[str]) -> Call:
@@ -114,35 +102,6 @@ def _unbox(box: str) -> str:
             body.append(line)
     sentence = " ".join(" ".join(body).split()).rstrip(".")
     return re.sub(r"^Error parsing (\S+): (?=.* is accepted$)", r"\1 is ", sentence)
-
-
-@KINDS.primitive_rule
-def _optional(
-    info: PrimitiveTypeInfo,
-) -> PrimitiveConstructorSpec | UnsupportedTypeAnnotationError | None:
-    """`X | None` as X: its default is called unset, and several numbers stand in no braces."""
-    kinds = [kind for kind in get_args(info.type) if kind is not NoneType]
-    if len(kinds) == len(get_args(info.type)):
-        return None
-    inner = PrimitiveTypeInfo.make(reduce(or_, kinds), info.markers)
-    spec = ConstructorRegistry.get_primitive_spec(inner)
-    if isinstance(spec, UnsupportedTypeAnnotationError):
-        return spec
-    metavar = re.sub(r"\{(\w+)\}", r"\1", spec.metavar)
-
-    def read(given: list[str]) -> object:
-        try:
-            return spec.instance_from_str(given)
-        except ValueError as error:
-            raise ValueError(f"{' '.join(given)}; {metavar} is accepted") from error
-
-    return replace(
-        spec,
-        metavar=metavar,
-        instance_from_str=read,
-        is_instance=lambda value: value is None or spec.is_instance(value),
-        str_from_instance=lambda v: ["unset"] if v is None else spec.str_from_instance(v),
-    )
 
 
 @contextmanager
