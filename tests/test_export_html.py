@@ -19,7 +19,7 @@ from photolin.cli import main
 from photolin.errors import InputError
 from photolin.export import load_result
 from photolin.export.html import escape, report_html
-from photolin.export.html_pictures import overlay
+from photolin.export.html_pictures import BUDGET, overlay, thumbnails
 from photolin.export.html_plots import colour, plot_histogram, plot_shares, ticks
 from photolin.factors import OUTSIDE, PALETTE, Factor
 from photolin.shape.recover import Shape, recover_shape
@@ -235,6 +235,16 @@ def test_96_images_of_noise_with_a_surface_stay_under_3_megabytes() -> None:
     pictures = Page(data).pictures()
     assert len(pictures) == 98
     assert min(max(p.shape) for p in pictures) >= 64
+
+
+def test_thumbnails_stay_small_where_the_first_looked_at_are_plain(analysis: Analysis) -> None:
+    rng = np.random.default_rng(0)
+    labels = np.tile(rng.integers(0, 5, (8, 300, 300), np.uint8), (12, 1, 1))
+    labels[::12] = 1
+    names = tuple(map(str, range(96)))
+    made = thumbnails(replace(analysis, labels=labels, names=names))
+    assert len(made) == 96
+    assert 400_000 < sum(map(len, made)) <= BUDGET
 
 
 def test_a_page_without_the_stack_says_what_is_missing(analysis: Analysis) -> None:
