@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from ..errors import DegenerateError, InputError
 
@@ -24,6 +23,8 @@ def fit_circle(
         InputError: fewer than three points, or not finite.
         DegenerateError: the points lie on a line.
     """
+    from scipy.optimize import least_squares  # takes a quarter of a second to import
+
     points = np.array([rows, columns], float).T
     if len(points) < 3 or not np.isfinite(points).all():
         raise InputError(

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from ..errors import DegenerateError
 
@@ -70,6 +69,8 @@ def solve_linear(given: Floats, known: Floats) -> Floats:
 
 def refine_directions(matrix: Floats, given: Floats, known: Floats) -> Floats:
     """The M near `matrix` with the least sum of squared angles."""
+    from scipy.optimize import least_squares  # takes a quarter of a second to import
+
     scale = np.linalg.norm(matrix)
 
     def differences(x: Floats) -> Floats:
