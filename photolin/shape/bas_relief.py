@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, gaussian_filter1d
+from scipy.optimize import minimize
 
 from .directions import Floats, normalize
 
@@ -88,8 +89,6 @@ def face_camera(vectors: Floats, weights: Floats) -> Floats:
 
 def search(function, stretch: float) -> tuple[Floats, float]:
     """The least of `function` of (b, c, stretch) that is found from (0, 0, `stretch`)."""
-    from scipy.optimize import minimize  # takes a quarter of a second to import
-
     start = np.array([0, 0, stretch])
     corners = start + np.array([(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0), (0, 0, 0.4)])
     found = minimize(

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ..analysis import Analysis
 from ..errors import InputError
-from .integrability import resolve_by_integrability
 from .known import Known
 from .points import resolve_from_points
 from .resolved import Resolved
@@ -35,6 +34,9 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
         unused = "; the lights given with the stack served the linearization alone"
         return found if analysis.lights is None else replace(found, note=found.note + unused)
     if analysis.lights is None:
+        # what it needs of scipy takes a third of a second to import
+        from .integrability import resolve_by_integrability
+
         return resolve_by_integrability(
             analysis.linearized_bases, analysis.mask, analysis.coefficients
         )

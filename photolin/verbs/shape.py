@@ -25,7 +25,6 @@ from ..export.lights import lights_diligent, lights_lp
 from ..export.surface import surface_files
 from ..load import LoadOptions, load_channels
 from ..pipeline import analyze
-from ..shape.chrome_ball import estimate_lights
 from ..shape.colour import colour_albedo
 from ..shape.known import Sphere, read_known
 from ..shape.recover import Shape, check_scale, recover_shape
@@ -154,6 +153,9 @@ def lights(
         balls: Images of the ball, one for each light, with a mask of its disc.
         out: Folder for the files; made when missing.
     """
+    # what it needs of scipy takes an eighth of a second to import
+    from ..shape.chrome_ball import estimate_lights
+
     check_output(out)
     with progress_bar() as progress:
         images, _ = read_stack(balls, reading, progress)
