@@ -66,6 +66,11 @@ class Thresholds:
             raise OptionError(f"Ts is {self.Ts:g}; accepted is a number from 0 to below 1")
 
 
+def css_colour(factor: int) -> str:
+    """The colour of a factor as CSS and SVG have it."""
+    return "#{:02X}{:02X}{:02X}".format(*PALETTE[Factor(factor)])
+
+
 def classify(i: ArrayLike, l: ArrayLike, thresholds: Thresholds) -> NDArray[np.uint8]:
     """Label observations by Eq. (3).
 

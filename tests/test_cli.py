@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from command_line import complaint
 from PIL import Image
 
 from photolin.analysis import Options
@@ -39,16 +40,6 @@ def result(stack: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("result") / "new" / "out"
     assert main(["run", str(stack), str(out), "--T", "0.02", "--Ts", "0.005", "--seed", "4"]) == 0
     return out
-
-
-def complaint(arguments: list[str | Path], capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line that a command line gets, with exit status 2."""
-    capsys.readouterr()
-    assert main([str(a) for a in arguments]) == 2
-    line = capsys.readouterr().err
-    assert re.fullmatch(r"photolin: [^\n]+\n", line), line
-    assert "Traceback" not in line
-    return line
 
 
 def test_run_writes_a_result_of_its_stack(stack: Path, result: Path) -> None:

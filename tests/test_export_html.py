@@ -20,8 +20,8 @@ from photolin.errors import InputError
 from photolin.export import load_result
 from photolin.export.html import escape, report_html
 from photolin.export.html_pictures import BUDGET, overlay, thumbnails
-from photolin.export.html_plots import colour, plot_histogram, plot_shares, ticks
-from photolin.factors import OUTSIDE, PALETTE, Factor
+from photolin.export.html_plots import plot_histogram, plot_shares, ticks
+from photolin.factors import OUTSIDE, PALETTE, Factor, css_colour
 from photolin.shape.recover import Shape, recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 from photolin.shape.resolved import Resolved
@@ -177,7 +177,7 @@ def test_settings_remarks_legend_and_command_are_there(
     ):
         assert word in page.text
     data = report_html(analysis).decode()
-    assert all(f"background:{colour(factor)}" in data for factor in PALETTE)
+    assert all(f"background:{css_colour(factor)}" in data for factor in PALETTE)
     calm = report_html(replace(analysis, warnings=())).decode()
     assert ("No warnings." in calm, "No warnings." in page.text) == (True, False)
     assert "To make it again" not in data
@@ -303,8 +303,8 @@ def test_the_bar_of_shares_is_divided_as_the_classes_are() -> None:
     starts, widths, fills = zip(*bars, strict=True)
     assert [float(x) for x in starts] == [0, 50, 70, 85, 95]
     assert [float(w) for w in widths] == [50, 20, 15, 10, 5]
-    assert fills[0] == colour(Factor.DIFFUSE)
-    assert fills[4] == colour(Factor.UNDEFINED)
+    assert fills[0] == css_colour(Factor.DIFFUSE)
+    assert fills[4] == css_colour(Factor.UNDEFINED)
     assert root.attrib["aria-label"].startswith("D 50.0 %, S 20.0 %")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import complaint
 from scipy.io import savemat
 
 from photolin.cli import main
@@ -60,14 +61,6 @@ def say(arguments: list[str | Path], capsys: pytest.CaptureFixture[str]) -> str:
     said = capsys.readouterr().out
     assert said.endswith(MEASURES + "\n")
     return said.removesuffix(MEASURES + "\n")
-
-
-def complaint(arguments: list[str | Path], capsys: pytest.CaptureFixture[str]) -> str:
-    capsys.readouterr()
-    assert main([str(a) for a in arguments]) == 2
-    line = capsys.readouterr().err
-    assert re.fullmatch(r"photolin: [^\n]+\n", line), line
-    return line
 
 
 def figures(said: str) -> set[str]:

@@ -9,6 +9,7 @@ import imagecodecs
 import numpy as np
 import pytest
 import tifffile
+from command_line import complaint
 from test_shape_chrome_ball import mirror, sky
 
 from photolin.cli import main
@@ -71,16 +72,6 @@ def _radius(stack: Path) -> float:
 
 def run(arguments: list[str | Path]) -> None:
     assert main([str(a) for a in arguments]) == 0
-
-
-def complaint(arguments: list[str | Path], capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line that a command line gets, with exit status 2."""
-    capsys.readouterr()
-    assert main([str(a) for a in arguments]) == 2
-    line = capsys.readouterr().err
-    assert re.fullmatch(r"photolin: [^\n]+\n", line), line
-    assert "Traceback" not in line
-    return line
 
 
 def error(out: Path, stack: Path) -> float:

@@ -19,14 +19,12 @@ import viser
 from photolin.shape.recover import Shape
 
 from .relief import MESH, Relief
+from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
 WORLD_HEIGHT = 10.0
 """Height of the picture in viser's world, whatever its pixels."""
 _PLANES = ("/canvas/base", "/canvas/overlay")
-
-Pixel = tuple[int, int]
-"""(row, column)."""
 
 
 class Window(NamedTuple):

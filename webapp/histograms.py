@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photolin.analysis import Analysis
-from photolin.factors import PALETTE, Factor, Thresholds
+from photolin.export.html_plots import ticks
+from photolin.factors import Factor, Thresholds, css_colour
 from photolin.stack import ImageStack
 
-from .plots import ticks
 from .readout import escape
 
 WIDTH, HEIGHT = 300, 110
@@ -91,7 +91,10 @@ def plot_residuals(values: NDArray[np.float32], thresholds: Thresholds) -> str:
     if values.size:
         top = max(top, min(float(np.quantile(values, 0.99)), 0.5))
     return plot_histogram(
-        [(values, css(Factor.DIFFUSE))], top, thresholds.T, "(l - i)/i below the fit; line: T"
+        [(values, css_colour(Factor.DIFFUSE))],
+        top,
+        thresholds.T,
+        "(l - i)/i below the fit; line: T",
     )
 
 
@@ -100,10 +103,5 @@ def plot_samples(shadows: NDArray[np.float32], lit: NDArray[np.float32], Ts: flo
     top = max(2.5 * Ts, float(shadows.max(initial=0)) * 1.2, 1e-4)
     if lit.size:
         top = max(top, min(float(np.quantile(lit, 0.3)) * 1.2, 10 * top))
-    kinds = [(shadows, css(Factor.CAST)), (lit, css(Factor.DIFFUSE))]
+    kinds = [(shadows, css_colour(Factor.CAST)), (lit, css_colour(Factor.DIFFUSE))]
     return plot_histogram(kinds, top, Ts, "intensity (fraction of full scale); line: Ts")
-
-
-def css(factor: Factor) -> str:
-    """The colour of a class."""
-    return "#{:02X}{:02X}{:02X}".format(*PALETTE[factor])

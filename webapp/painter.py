@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .canvas import Canvas, Pixel
+from .canvas import Canvas
 from .compare import differ, lay_over, other_frame, split
 from .frame import Frame
 from .readout import status_line
@@ -18,7 +18,7 @@ from .render import (
     render_linearized,
     render_residual,
 )
-from .state import ENCODINGS, SURFACE, Layer
+from .state import ENCODINGS, SURFACE, Layer, Pixel
 from .surface import render_surface
 
 SIGNED = ("linearized", "residual")

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.factors import LETTERS, PALETTE, TITLES, Factor, Thresholds
+from photolin.export.html_plots import ticks
+from photolin.factors import LETTERS, TITLES, Factor, Thresholds, css_colour
 
 from .readout import escape
 
@@ -135,12 +136,12 @@ def _regions(axes: _Axes, thresholds: Thresholds) -> str:
         (Factor.UNDEFINED, (middle, low / 2)),
     ]
     fills = "".join(
-        f'<polygon points="{_points(axes, area)}" fill="{_colour(factor)}" fill-opacity="0.12"/>'
+        f'<polygon points="{_points(axes, area)}" fill="{css_colour(factor)}" fill-opacity="0.12"/>'
         for factor, area in areas
     )
     texts = "".join(
         '<text x="{}" y="{}" text-anchor="middle" dominant-baseline="central" font-weight="600" '
-        'fill="{}">{}</text>'.format(*axes.at(*place), _colour(factor), LETTERS[factor])
+        'fill="{}">{}</text>'.format(*axes.at(*place), css_colour(factor), LETTERS[factor])
         for factor, place in letters
     )
     return fills + texts
@@ -152,8 +153,8 @@ def _lines(axes: _Axes, thresholds: Thresholds) -> str:
         ('stroke-opacity="0.35"', (left, left), (high, high)),
         ('stroke-opacity="0.5"', (left, 0), (high, 0)),
         ('stroke-dasharray="4 3"', (Ts, low), (Ts, high)),
-        (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 - T) * Ts), (high, (1 - T) * high)),
-        (f'stroke="{_colour(Factor.DIFFUSE)}"', (Ts, (1 + T) * Ts), (high, (1 + T) * high)),
+        (f'stroke="{css_colour(Factor.DIFFUSE)}"', (Ts, (1 - T) * Ts), (high, (1 - T) * high)),
+        (f'stroke="{css_colour(Factor.DIFFUSE)}"', (Ts, (1 + T) * Ts), (high, (1 + T) * high)),
     ]
     drawn = "".join(
         '<line x1="{}" y1="{}" x2="{}" y2="{}" {}/>'.format(*axes.at(*a), *axes.at(*b), look)
@@ -176,7 +177,7 @@ def _dot(panel: PixelPanel, k: int, axes: _Axes, name: str, *, ringed: bool) -> 
     return (
         f"<g><title>{escape(f'{name}: i {i:.3f}, l {l:z.3f}, {TITLES[factor]}')}</title>"
         f"{ring if ringed else ''}"
-        f'<circle cx="{x}" cy="{y}" r="{5 if ringed else 3.2}" fill="{_colour(factor)}" '
+        f'<circle cx="{x}" cy="{y}" r="{5 if ringed else 3.2}" fill="{css_colour(factor)}" '
         'stroke="currentColor" stroke-width="0.6"/></g>'
     )
 
@@ -188,7 +189,7 @@ def _frame(axes: _Axes) -> str:
         f'<rect x="{LEFT}" y="{TOP}" width="{wide}" height="{high}" fill="none" '
         'stroke="currentColor" stroke-opacity="0.5"/>'
         f'<text x="{LEFT + wide + 4:g}" y="{TOP + 9}" font-weight="600" '
-        f'fill="{_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
+        f'fill="{css_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
     ]
     for value in ticks(axes.left, axes.high):
         x, _ = axes.at(value, 0)
@@ -207,18 +208,5 @@ def _frame(axes: _Axes) -> str:
     return "".join(parts)
 
 
-def ticks(low: float, high: float) -> list[float]:
-    """Three to seven round numbers inside the range."""
-    span = high - low
-    power = 10.0 ** np.floor(np.log10(span / 3))
-    step = max(s * power for s in (1, 2, 5) if s * power <= span / 3)
-    numbers = range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)
-    return [round(n * step, 10) for n in numbers]
-
-
 def _points(axes: _Axes, corners: Sequence[Point]) -> str:
     return " ".join("{},{}".format(*axes.at(*corner)) for corner in corners)
-
-
-def _colour(factor: Factor) -> str:
-    return "#{:02X}{:02X}{:02X}".format(*PALETTE[factor])

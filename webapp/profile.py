@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photolin.analysis import Confidence
-from photolin.factors import LETTERS, PALETTE, TITLES, Factor, Thresholds
+from photolin.export.html_plots import ticks
+from photolin.factors import LETTERS, TITLES, Factor, Thresholds, css_colour
 
-from .plots import PixelPanel, ticks
+from .plots import PixelPanel
 from .readout import escape, rule_of
 
 WIDTH, HEIGHT = 300, 130
@@ -97,7 +98,7 @@ def _curve(profile: Profile, dashes: str, at: Callable[[float, float], tuple[flo
         x, y = at(k, i)
         title = f"{profile.name}, image {k}: i {i:.3f}, {TITLES[Factor(label)]}"
         dots.append(
-            f'<circle cx="{x}" cy="{y}" r="2.6" fill="{_colour(label)}" stroke="currentColor" '
+            f'<circle cx="{x}" cy="{y}" r="2.6" fill="{css_colour(label)}" stroke="currentColor" '
             f'stroke-width="0.5"><title>{escape(title)}</title></circle>'
         )
     return line + "".join(dots)
@@ -117,7 +118,7 @@ def tabulate_pixel(
         rule = escape(rule_of(i, l, thresholds))
         rows.append(
             f'<tr{here} title="{escape(names[k])}"><td>{k}</td><td>{i:.3f}</td><td>{linear}</td>'
-            f'<td>{share}</td><td style="color:{_colour(label)};font-weight:600;padding:0 6px">'
+            f'<td>{share}</td><td style="color:{css_colour(label)};font-weight:600;padding:0 6px">'
             f'{LETTERS[Factor(label)]}</td><td style="text-align:left">{rule}</td></tr>'
         )
     heads = ("image", "i", "l", "|i-l|/i", "", "rule")
@@ -151,7 +152,3 @@ def next_image(labels: NDArray[np.uint8], current: int, factor: Factor) -> int |
         return None
     later = found[found > current]
     return int(later[0] if later.size else found[0])
-
-
-def _colour(label: int) -> str:
-    return "#{:02X}{:02X}{:02X}".format(*PALETTE[Factor(label)])

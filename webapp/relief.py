@@ -13,6 +13,7 @@ from photolin.shape.mesh import build_mesh
 from photolin.shape.recover import Shape
 
 from .ray import meet_relief, ray_in_text
+from .state import Pixel
 
 MESH, ARROWS = "/canvas/relief", "/canvas/lights"
 MOST_VERTICES = 150_000
@@ -21,9 +22,6 @@ FAR, LONG = 0.36, 0.1
 """Where arrows end and how long they are, in diagonals of the picture."""
 ARROW, CHOSEN = (250, 220, 90), (255, 120, 40)
 """Colours of the lights, and of that of the image shown."""
-
-Pixel = tuple[int, int]
-"""(row, column)"""
 
 
 class Relief:

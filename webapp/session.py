@@ -20,7 +20,7 @@ from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, PhotolinError
 from photolin.factors import LETTERS, Factor, Thresholds
 
-from .canvas import Canvas, Pixel, Window
+from .canvas import Canvas, Window
 from .catch_up import CatchUp
 from .clicks import Clicks
 from .downloads import Pack
@@ -28,7 +28,7 @@ from .frame import Frame, compose
 from .live import Live, Preview
 from .painter import Painter
 from .runs import Runs
-from .state import MOST_PINS, SURFACE, ViewState
+from .state import MOST_PINS, SURFACE, Pixel, ViewState
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView

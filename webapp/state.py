@@ -14,6 +14,8 @@ SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
+Pixel = tuple[int, int]
+"""(row, column)"""
 MOST_PINS = 4
 
 
@@ -53,9 +55,9 @@ class ViewState:
     """Draw the lights beside the surface."""
     light: tuple[float, float] = (-0.4, 0.5)
     """x (right) and y (up) of the unit direction of the light of the layer relit."""
-    pixel: tuple[int, int] | None = None
+    pixel: Pixel | None = None
     """(row, column) of the selected pixel."""
-    pins: tuple[tuple[int, int], ...] = ()
+    pins: tuple[Pixel, ...] = ()
     """(row, column) of up to MOST_PINS pixels that are compared with the selected one."""
     gain: float | None = None
     """Display factor of input images, above 0; None means chosen from the stack."""

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..analysis import Analysis
 from ..errors import InputError
-from ..factors import LETTERS, TITLES
+from ..factors import LETTERS, TITLES, css_colour
 from ..sample import draw_sample
 from ..saturation import find_white
 from ..shadow_level import dark_histogram
 from ..shape.recover import Shape
 from ..stack import ImageStack
 from .html_pictures import albedo_picture, choose_gain, normals_picture, thumbnails
-from .html_plots import colour, plot_histogram, plot_shares
+from .html_plots import plot_histogram, plot_shares
 from .html_style import STYLE
 from .report import describe_analysis, program_version
 
@@ -112,7 +112,7 @@ def _remarks(analysis: Analysis) -> str:
 
 def _legend() -> str:
     items = " &nbsp; ".join(
-        f'<span class="swatch" style="background:{colour(factor)}"></span> {letter} '
+        f'<span class="swatch" style="background:{css_colour(factor)}"></span> {letter} '
         f"{TITLES[factor]}"
         for factor, letter in LETTERS.items()
     )

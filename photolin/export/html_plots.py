@@ -9,7 +9,7 @@ from math import floor, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from ..factors import LETTERS, PALETTE, Factor
+from ..factors import LETTERS, Factor, css_colour
 
 WIDTH, HEIGHT, MARGIN, BELOW = 440, 150, 14, 36
 """Of the plot itself, and around it, in the units of the drawing (pixels at its natural size)."""
@@ -47,7 +47,7 @@ def plot_histogram(
         a, b = map(x, band)
         parts.append(
             f'<rect x="{a}" y="0" width="{b - a:.2f}" height="{HEIGHT}" '
-            f'fill="{colour(Factor.DIFFUSE)}" fill-opacity="0.25"/>'
+            f'fill="{css_colour(Factor.DIFFUSE)}" fill-opacity="0.25"/>'
         )
     for name, value in lines.items():
         at = x(value)
@@ -73,9 +73,8 @@ def plot_shares(percents: Sequence[float]) -> str:
     """One bar, divided as the classes are, in the order of the legend; 0 to 100 each."""
     at, parts = 0.0, []
     for factor, percent in zip(LETTERS, percents, strict=True):
-        parts.append(
-            f'<rect x="{at:.2f}" y="0" width="{percent:.2f}" height="10" fill="{colour(factor)}"/>'
-        )
+        place = f'x="{at:.2f}" y="0" width="{percent:.2f}" height="10"'
+        parts.append(f'<rect {place} fill="{css_colour(factor)}"/>')
         at += percent
     words = ", ".join(
         f"{letter} {percent:.1f} %"
@@ -91,11 +90,6 @@ def ticks(low: float, high: float) -> list[float]:
     step = max(s * power for s in (1, 2, 5) if s * power <= third)
     numbers = range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)
     return [float(f"{n * step:.6g}") for n in numbers]
-
-
-def colour(factor: Factor) -> str:
-    """The factor's colour as CSS has it."""
-    return "#{:02X}{:02X}{:02X}".format(*PALETTE[factor])
 
 
 def _svg(width: float, height: float, words: str, inner: str) -> str:

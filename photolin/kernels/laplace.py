@@ -7,19 +7,25 @@ the last column, or row. (A z)_a is the sum over the neighbours b of weight_ab (
 from numba import njit
 
 
+@njit(nogil=True, cache=True, inline="always")
+def _rest(right, down, given, z, r, c, above, below):  # pragma: no cover
+    """given - A z at the pixel (r, c), whose rows above and below are given."""
+    # at a border the pixel is its own neighbour: cheaper than to ask
+    before, after, here = max(c - 1, 0), min(c + 1, z.shape[1] - 1), z[r, c]
+    rest = given[r, c]
+    rest += right[r, before] * (z[r, before] - here) + right[r, c] * (z[r, after] - here)
+    rest += down[above, c] * (z[above, c] - here) + down[r, c] * (z[below, c] - here)
+    return rest
+
+
 @njit(nogil=True, cache=True)
 def residual_rows(right, down, given, z, out, start, stop):  # pragma: no cover
     """out = given - A z in the rows from `start` to before `stop`; all arrays (H,W)."""
     H, W = z.shape
     for r in range(start, stop):
-        # at a border the pixel is its own neighbour: cheaper than to ask
         above, below = max(r - 1, 0), min(r + 1, H - 1)
         for c in range(W):
-            before, after, here = max(c - 1, 0), min(c + 1, W - 1), z[r, c]
-            rest = given[r, c]
-            rest += right[r, before] * (z[r, before] - here) + right[r, c] * (z[r, after] - here)
-            rest += down[above, c] * (z[above, c] - here) + down[r, c] * (z[below, c] - here)
-            out[r, c] = rest
+            out[r, c] = _rest(right, down, given, z, r, c, above, below)
 
 
 @njit(nogil=True, cache=True)
@@ -34,9 +40,6 @@ def smooth_rows(
     for r in range(start, stop):
         above, below = max(r - 1, 0), min(r + 1, H - 1)
         for c in range(W):
-            before, after, here = max(c - 1, 0), min(c + 1, W - 1), z[r, c]
-            rest = given[r, c]
-            rest += right[r, before] * (z[r, before] - here) + right[r, c] * (z[r, after] - here)
-            rest += down[above, c] * (z[above, c] - here) + down[r, c] * (z[below, c] - here)
+            rest = _rest(right, down, given, z, r, c, above, below)
             step[r, c] = keep * step[r, c] + take * inverse[r, c] * rest
-            out[r, c] = here + step[r, c]
+            out[r, c] = z[r, c] + step[r, c]

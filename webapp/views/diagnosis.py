@@ -10,13 +10,11 @@ from ..frame import Frame, pixel_values
 from ..plots import PixelPanel, plot_pixel
 from ..profile import Profile, describe_confidence, next_image, plot_profile, tabulate_pixel
 from ..readout import escape
+from ..state import Pixel
 from . import INDENT
 
 PIN, UNPIN = "pin", "unpin all"
 SPECULAR, UNDEFINED = "next specular", "next undefined"
-
-Pixel = tuple[int, int]
-"""(row, column)"""
 
 
 class DiagnosisView:

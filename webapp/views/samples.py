@@ -16,15 +16,13 @@ from photolin.stack import ImageStack
 from ..frame import Frame
 from ..histograms import plot_residuals, plot_samples, residuals_below
 from ..readout import escape
+from ..state import Pixel
 from . import INDENT
 
 SHADOW, LIT, UNDO, STOP = "shadow", "lit", "undo", "stop"
 Kind = Literal["shadow", "lit"]
 SIDES = {"1 pixel": 0, "5 x 5": 2, "15 x 15": 7, "41 x 41": 20}
 """What a click takes, and how far it reaches from the pixel."""
-
-Pixel = tuple[int, int]
-"""(row, column)"""
 
 
 @dataclass(frozen=True)

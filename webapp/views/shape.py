@@ -15,7 +15,7 @@ from photolin.stack import ImageStack
 from ..frame import Frame
 from ..live import is_behind
 from ..readout import describe_shape, escape, shape_status
-from ..state import ViewState
+from ..state import Pixel, ViewState
 from ..values import choose_option, clamp_number
 from . import ATTENTION, INDENT
 
@@ -31,9 +31,6 @@ ENOUGH = 5
 RIM, ON, SELECT, CLEAR = "outline", "points", "select", "clear"
 Picking = Literal["outline", "points"]
 LARGEST = 1e5
-
-Pixel = tuple[int, int]
-"""(row, column)"""
 
 
 class ShapeView:
