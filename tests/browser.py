@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from webapp.viser_internals import widget_id
+
 READY = "window.photolin?.similarity() != null"
 # The picture settles a little after the last message: textures load and frames are drawn in turn.
 CHANGED_MS = 10_000
@@ -93,3 +95,25 @@ def encode_png(pixels: np.ndarray) -> bytes:
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "png")
     return buffer.getvalue()
+
+
+def widget(page: Any, handle: Any) -> Any:
+    return page.locator(f"[id='{widget_id(handle)}']")
+
+
+def press(page: Any, *keys: str) -> None:
+    """Keys one by one; inputs closer than 50 ms would be merged by viser."""
+    for key in keys:
+        page.keyboard.press(key)
+        page.wait_for_timeout(70)
+
+
+def choose(page: Any, handle: Any, option: str) -> None:
+    widget(page, handle).click()
+    page.get_by_role("option", name=option, exact=True).click()
+    wait_for_keys(page)
+
+
+def wait_for_keys(page: Any) -> None:
+    """Wait until no widget has the keys, a moment after a click."""
+    page.wait_for_function("document.activeElement === document.body")

@@ -16,12 +16,16 @@ import numpy as np
 import pytest
 import tifffile
 from browser import (
+    choose,
     click_pixel,
     colours_on_screen,
     open_canvas,
     place_of,
+    press,
     wait_for_colours,
+    wait_for_keys,
     wait_until,
+    widget,
 )
 from lambert import lambertian
 from PIL import Image
@@ -108,10 +112,6 @@ def enter(page: Any, app: App, *, live: bool = False) -> Session:
     return session
 
 
-def widget(page: Any, handle: Any) -> Any:
-    return page.locator(f"[id='{widget_id(handle)}']")
-
-
 def thumb(page: Any, handle: Any) -> Any:
     return widget(page, handle).get_by_role("slider")
 
@@ -120,24 +120,6 @@ def number(page: Any, handle: Any) -> float:
     """What the number field beside a slider shows."""
     row = widget(page, handle).locator("xpath=..")
     return float(row.locator("input:not([type=hidden])").input_value())
-
-
-def press(page: Any, *keys: str) -> None:
-    """Keys one by one; inputs closer than 50 ms would be merged by viser."""
-    for key in keys:
-        page.keyboard.press(key)
-        page.wait_for_timeout(70)
-
-
-def choose(page: Any, handle: Any, option: str) -> None:
-    widget(page, handle).click()
-    page.get_by_role("option", name=option, exact=True).click()
-    wait_for_keys(page)
-
-
-def wait_for_keys(page: Any) -> None:
-    """Wait until no widget has the keys, a moment after a click."""
-    page.wait_for_function("document.activeElement === document.body")
 
 
 def leave_widgets(page: Any) -> None:

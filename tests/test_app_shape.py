@@ -13,8 +13,10 @@ import pytest
 import tifffile
 from browser import (
     camera_rotation,
+    choose,
     click_pixel,
     open_canvas,
+    press,
     screenshot,
     similarity,
     wait_for_colours,
@@ -29,7 +31,6 @@ from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.session import Session
 from webapp.surface import render_surface
-from webapp.viser_internals import widget_id
 from webapp.work import Recovered
 
 pytestmark = [
@@ -88,26 +89,9 @@ def enter(page: Any, app: App) -> Session:
     return session
 
 
-def widget(page: Any, handle: Any) -> Any:
-    return page.locator(f"[id='{widget_id(handle)}']")
-
-
 def leave_widgets(page: Any) -> None:
     page.wait_for_timeout(60)
     page.evaluate("document.activeElement.blur()")
-
-
-def press(page: Any, *keys: str) -> None:
-    """Keys one by one; inputs closer than 50 ms would be merged by viser."""
-    for key in keys:
-        page.keyboard.press(key)
-        page.wait_for_timeout(70)
-
-
-def choose(page: Any, handle: Any, option: str) -> None:
-    widget(page, handle).click()
-    page.get_by_role("option", name=option, exact=True).click()
-    page.wait_for_function("document.activeElement === document.body")
 
 
 def push(page: Any, name: str) -> None:

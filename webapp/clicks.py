@@ -72,6 +72,14 @@ class Clicks:
         call_javascript(self._client, "window.photolinClicks.watch", name)
         return f"photolin-{name}"
 
+    def see(self, name: str, seen: Callable[[bool], None]) -> str:
+        """`watch` without clicks."""
+        return self.watch(name, _ignore, seen)
+
+
+def _ignore(x: float, y: float) -> None:
+    """Clicks on an element that is only looked at."""
+
 
 def event_in_text(text: str) -> Click | Sight | None:
     """What the page wrote as "number name x,y", "number name shown" or "... hidden", or None."""

@@ -89,7 +89,7 @@ class Session:
 
     def _build(self, client: viser.ClientHandle) -> None:
         _, H, W = self._stack.shape
-        gui, changed = client.gui, self._wake.set
+        gui, changed, clicks = client.gui, self._wake.set, Clicks(client)
         gui.configure_theme(
             control_width="large", show_logo=False, show_share_button=False, dark_mode=True
         )
@@ -111,13 +111,11 @@ class Session:
                 self._summary = SummaryView(gui)
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self._thresholds.add_steps(gui)
-            self._samples = SamplesView(gui, self._stack, self._resample, self._set_Ts)
+            self._samples = SamplesView(gui, clicks, self._stack, self._resample, self._set_Ts)
         with tabs.add_tab("Map", viser.Icon.MAP):
-            self._landscape = LandscapeView(
-                gui, Clicks(client), self._stack, self._move, self._tell
-            )
+            self._landscape = LandscapeView(gui, clicks, self._stack, self._move, self._tell)
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
-            self._diagnosis = DiagnosisView(gui, self._pin, self._unpin, self._picture.go)
+            self._diagnosis = DiagnosisView(gui, clicks, self._pin, self._unpin, self._picture.go)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
             self._compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):

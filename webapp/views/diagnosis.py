@@ -6,28 +6,31 @@ import viser
 
 from photolin.factors import Factor, Thresholds
 
+from ..clicks import Clicks
 from ..frame import Frame, pixel_values
 from ..plots import PixelPanel, plot_pixel
 from ..profile import Profile, describe_confidence, next_image, plot_profile, tabulate_pixel
 from ..readout import escape
 from ..state import Pixel
 from . import INDENT
+from .watched import Watched
 
 PIN, UNPIN = "pin", "unpin all"
 SPECULAR, UNDEFINED = "next specular", "next undefined"
 
 
-class DiagnosisView:
+class DiagnosisView(Watched):
     """What one pixel is, in numbers."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
+        clicks: Clicks,
         pin: Callable[[], None],
         unpin: Callable[[], None],
         go: Callable[[int], None],
     ) -> None:
-        self._frame: Frame | None = None
+        super().__init__(clicks, "pixel")
         self._go = go
         self._buttons = gui.add_button_group(
             " ",
@@ -41,7 +44,7 @@ class DiagnosisView:
             hint="Go to the next image where the selected pixel is specular, or undefined (keys: "
             "X and U)",
         )
-        self._text = gui.add_html("")
+        self._text = gui.add_html(f'<div id="{self._id}"></div>')
         actions = {PIN: pin, UNPIN: unpin}
 
         @self._buttons.on_click
@@ -62,15 +65,15 @@ class DiagnosisView:
         if (found := next_image(values.labels, state.image, factor)) is not None:
             self._go(found)
 
-    def draw(self, frame: Frame) -> None:
+    def _show(self, frame: Frame) -> None:
         """Draw the selected pixel first, then the pinned ones."""
-        self._frame = frame
         state, analysis = frame.state, frame.analysis
         chosen = [] if state.pixel is None else [state.pixel]
         pixels = [p for p in (*chosen, *state.pins) if frame.stack.mask[p]]
         pixels = list(dict.fromkeys(pixels))
         if analysis is None or not pixels:
-            self._text.content = _paragraph("Click a pixel of the object to see it in all images.")
+            inner = _paragraph("Click a pixel of the object to see it in all images.")
+            self._text.content = f'<div id="{self._id}" style="{INDENT}">{inner}</div>'
             return
         T = state.thresholds
         profiles = []
@@ -84,7 +87,7 @@ class DiagnosisView:
             parts.append(plot_pixel(panels, T, state.image, frame.stack.names))
         parts.append(plot_profile(profiles[:4], T, state.image))
         parts.append(tabulate_pixel(profiles[0].panel, T, state.image, frame.stack.names))
-        self._text.content = f'<div style="{INDENT}">{"".join(parts)}</div>'
+        self._text.content = f'<div id="{self._id}" style="{INDENT}">{"".join(parts)}</div>'
 
     def _describe(
         self, frame: Frame, pixels: list[Pixel], profiles: list[Profile], thresholds: Thresholds

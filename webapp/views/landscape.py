@@ -87,7 +87,7 @@ class LandscapeView:
         self._bar = gui.add_progress_bar(0, visible=False, animated=True)
         self._cancel = gui.add_button("Cancel", visible=False, icon=viser.Icon.X)
         self._map_id = clicks.watch("landscape", self._click, lambda shown: None)
-        self._view_id = clicks.watch("landscape-view", lambda x, y: None, self._see)
+        self._view_id = clicks.see("landscape-view", self._see)
         self._show()
 
         @self._quantity.on_update

@@ -13,11 +13,13 @@ from photolin.factors import Thresholds
 from photolin.shadow_level import ShadowLevel, sample_shadow_level
 from photolin.stack import ImageStack
 
+from ..clicks import Clicks
 from ..frame import Frame
 from ..histograms import plot_residuals, plot_samples, residuals_below
 from ..readout import escape
 from ..state import Pixel
 from . import INDENT
+from .watched import Watched
 
 SHADOW, LIT, UNDO, STOP = "shadow", "lit", "undo", "stop"
 Kind = Literal["shadow", "lit"]
@@ -36,20 +38,21 @@ class Click:
     """Pixels around it."""
 
 
-class SamplesView:
+class SamplesView(Watched):
     """Clicks on shadows and on lit pixels, their histogram, and the Ts between them."""
 
     def __init__(
         self,
         gui: viser.GuiApi,
+        clicks: Clicks,
         stack: ImageStack,
         changed: Callable[[], None],
         apply: Callable[[float], None],
     ) -> None:
+        super().__init__(clicks, "samples")
         self._stack, self._changed = stack, changed
         self._picking: Kind | None = None
         self._clicks: tuple[Click, ...] = ()
-        self._image = 0
         self._residuals: tuple[Analysis, float, NDArray[np.float32]] | None = None
         gui.add_markdown(
             "Click **shadows** in some images, and **lit** pixels if you like: Ts is put between "
@@ -69,7 +72,7 @@ class SamplesView:
         self._apply = gui.add_button(
             "Set Ts", hint="Move the slider Ts to the level found; Z undoes it"
         )
-        self._plot = gui.add_html("")
+        self._plot = gui.add_html(f'<div id="{self._id}"></div>')
 
         @self._kind.on_click
         async def _(_: viser.GuiEvent) -> None:
@@ -83,7 +86,8 @@ class SamplesView:
     @property
     def marks(self) -> tuple[tuple[int, int, str], ...]:
         """(row, column, text) of the clicks in the image shown."""
-        here = [click for click in self._clicks if click.image == self._image]
+        image = self._image()
+        here = [click for click in self._clicks if click.image == image]
         return tuple((*click.pixel, click.kind) for click in here)
 
     def take(self, pixel: Pixel) -> bool:
@@ -91,29 +95,32 @@ class SamplesView:
         if self._picking is None:
             return False
         reach = SIDES.get(self._side.value, 0)
-        self._clicks = (*self._clicks, Click(self._picking, self._image, pixel, reach))
+        self._clicks = (*self._clicks, Click(self._picking, self._image(), pixel, reach))
         self._changed()
         return True
 
     def level(self) -> ShadowLevel | None:
         """The Ts that the clicks stand for; None without a click on a shadow."""
-        shadows = self._sampled(SHADOW)
-        return sample_shadow_level(shadows, self._sampled(LIT)) if shadows.size else None
+        shadows, lit = self._sampled(SHADOW), self._sampled(LIT)
+        return sample_shadow_level(shadows, lit) if shadows.size else None
 
-    def draw(self, frame: Frame) -> None:
+    def _image(self) -> int:
+        """Number of the image shown."""
+        return 0 if self._frame is None else self._frame.state.image
+
+    def _show(self, frame: Frame) -> None:
         """Draw both histograms and say what they stand for."""
-        self._image = frame.state.image
         T = frame.state.thresholds
-        level = self.level()
+        shadows, lit = self._sampled(SHADOW), self._sampled(LIT)
+        level = sample_shadow_level(shadows, lit) if shadows.size else None
         parts = []
         if level is not None:
-            parts.append(plot_samples(self._sampled(SHADOW), self._sampled(LIT), level.Ts))
+            parts.append(plot_samples(shadows, lit, level.Ts))
         if frame.analysis is not None:
             parts.append(plot_residuals(self._below(frame, frame.analysis), T))
-        self._plot.content = f'<div style="{INDENT}">{"".join(parts)}</div>'
-        self._told.content = (
-            f'<div style="{INDENT};font-size:0.8em">{escape(self._tell(level, T))}</div>'
-        )
+        self._plot.content = f'<div id="{self._id}" style="{INDENT}">{"".join(parts)}</div>'
+        told = self._tell(level, shadows.size, lit.size, T)
+        self._told.content = f'<div style="{INDENT};font-size:0.8em">{escape(told)}</div>'
 
     def _below(self, frame: Frame, analysis: Analysis) -> NDArray[np.float32]:
         """Residuals below the fit, computed once for each result and Ts."""
@@ -133,7 +140,9 @@ class SamplesView:
                 found.append(stack.images[click.image][part][stack.mask[part]])
         return np.concatenate(found) if found else np.empty(0, np.float32)
 
-    def _tell(self, level: ShadowLevel | None, thresholds: Thresholds) -> str:
+    def _tell(
+        self, level: ShadowLevel | None, shadows: int, lit: int, thresholds: Thresholds
+    ) -> str:
         doing = {
             None: "Clicks select pixels.",
             SHADOW: "Click shadows.",
@@ -141,9 +150,9 @@ class SamplesView:
         }[self._picking]
         if level is None:
             return f"{doing} No shadow sampled yet."
-        counts = ", ".join(f"{self._sampled(kind).size} {kind}" for kind in (SHADOW, LIT))
-        wrong = "" if not self._sampled(LIT).size else f", {level.error:.1%} on the wrong side"
-        return f"{doing} {counts} sampled: Ts {level.Ts:.4f}{wrong} (now {thresholds.Ts:.4f})."
+        wrong = f", {level.error:.1%} on the wrong side" if lit else ""
+        counts = f"{shadows} {SHADOW}, {lit} {LIT} sampled"
+        return f"{doing} {counts}: Ts {level.Ts:.4f}{wrong} (now {thresholds.Ts:.4f})."
 
     def _begin(self, what: str) -> None:
         if what == UNDO:

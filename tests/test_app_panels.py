@@ -1,0 +1,193 @@
+"""The panels beside Tune as a person meets them, in a real browser."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import (
+    choose,
+    click_pixel,
+    colours_on_screen,
+    open_canvas,
+    press,
+    wait_for_keys,
+    wait_until,
+)
+
+from photolin.analysis import Options
+from photolin.factors import Factor, Thresholds
+from photolin.pipeline import analyze
+from photolin.shadow_level import sample_shadow_level
+from photolin.synthetic import render_scene
+from webapp.app import App
+from webapp.frame import pixel_values
+from webapp.session import Session
+
+pytestmark = [
+    pytest.mark.browser,
+    # a tab may close while its worker draws
+    pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection"),
+]
+
+STACK = render_scene("sphere_cone", size=(48, 64), images=8).stack
+RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
+
+
+@pytest.fixture
+def app() -> Iterator[App]:
+    opened = App(STACK, RESULT, options=RESULT.options, port=0)
+    yield opened
+    opened.stop()
+
+
+def enter(page: Any, app: App, tab: str) -> Session:
+    """Open a tab of the browser at one of the tabs of the panel; only labels follow T."""
+    page.set_viewport_size({"width": 880, "height": 560})  # software GL is slow
+    open_canvas(page, app.server.url)
+    page.add_style_tag(content="* { box-shadow: none !important }")
+    wait_until(lambda: len(app._sessions) == 1)
+    (session,) = app._sessions.values()
+    wait_until(lambda: session._frame is not None)
+    session._thresholds._live.value = False
+    go_to(page, tab)
+    return session
+
+
+def go_to(page: Any, tab: str) -> None:
+    page.get_by_role("tab", name=tab).click()
+    wait_for_keys(page)
+
+
+def push(page: Any, name: str) -> None:
+    page.locator("button:visible").get_by_text(name, exact=True).click()
+    wait_for_keys(page)
+
+
+def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, app: App) -> None:
+    session = enter(page, app, "Samples")
+    shadows, lit = (np.argwhere(RESULT.labels[0, 3:-3, 3:-3] == f) + 3 for f in (4, 1))
+    clicks = {"shadow": shadows[[5, -5]], "lit": lit[[100]]}
+    taken = []
+    for kind, pixels in clicks.items():
+        push(page, kind)
+        for row, column in pixels.tolist():
+            click_pixel(page, row, column)
+            wait_until(lambda r=row, c=column: (r, c, kind) in session._samples.marks)  # noqa: B023
+            part = STACK.images[0, row - 2 : row + 3, column - 2 : column + 3]
+            taken.append((kind, part.ravel()))
+    both = [np.concatenate([p for k, p in taken if k == kind]) for kind in clicks]
+    expected = sample_shadow_level(*both).Ts
+    before = session._read().thresholds
+    page.get_by_text("50 shadow, 25 lit sampled").wait_for()
+    push(page, "Set Ts")
+    wait_until(lambda: session._read().Ts == pytest.approx(expected))
+    wait_until(lambda: session._thresholds._history.now.Ts == pytest.approx(expected))
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == before)
+    press(page, "Shift+Z")
+    wait_until(lambda: session._read().Ts == pytest.approx(expected))
+    assert session._pixel is None  # these clicks select nothing
+    push(page, "stop")
+    click_pixel(page, 20, 30)
+    wait_until(lambda: session._pixel == (20, 30))
+
+
+def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any, app: App) -> None:
+    session = enter(page, app, "Samples")
+    first = session._read().thresholds
+    seen = [first]
+    for _ in range(2):
+        press(page, "]")
+        wait_until(lambda: session._thresholds._history.now == session._read().thresholds)
+        seen.append(session._read().thresholds)
+    assert len(set(seen)) == 3
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == seen[1])
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == seen[0])
+    press(page, "Shift+Z", "Shift+Z")
+    wait_until(lambda: session._read().thresholds == seen[2])
+    push(page, "reset")
+    wait_until(lambda: session._read().thresholds == first)
+    wait_until(lambda: session._thresholds._history.now == first)
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == seen[2])
+
+
+def test_a_pixel_is_told_in_all_images_beside_pinned_ones(page: Any, app: App) -> None:
+    session = enter(page, app, "Pixel")
+    specular = np.argwhere((RESULT.labels[1:] == Factor.SPECULAR).any(axis=0))
+    row, column = specular[len(specular) // 2].tolist()
+    click_pixel(page, 20, 30)
+    wait_until(lambda: session._pixel == (20, 30))
+    press(page, "p")
+    click_pixel(page, row, column)
+    wait_until(lambda: session._read().pins == ((20, 30),) and session._pixel == (row, column))
+    page.get_by_text(f"row {row}, column {column} (line)").wait_for()
+    page.get_by_text("row 20, column 30 (dashes)").wait_for()
+    assert page.locator("table tr:visible").count() == 9
+    labels = pixel_values(STACK, RESULT, (row, column), session._read().thresholds).labels
+    there = np.flatnonzero(labels == Factor.SPECULAR)
+    expected = [*there[there > 0], there[0]][0]
+    press(page, "x")
+    wait_until(lambda: session._read().image == expected)
+    press(page, "p", "p")
+    wait_until(lambda: session._read().pins == ((20, 30),))
+    push(page, "unpin all")
+    wait_until(lambda: session._read().pins == ())
+
+
+def test_a_panel_out_of_view_is_not_drawn_and_up_to_date_once_it_is_opened(
+    page: Any, app: App
+) -> None:
+    session = enter(page, app, "Tune")
+    before = session._diagnosis._text.content
+    click_pixel(page, 20, 30)
+    wait_until(lambda: session._frame is not None and session._frame.state.pixel == (20, 30))
+    press(page, "ArrowRight")
+    wait_until(lambda: session._frame is not None and session._frame.state.image == 1)
+    assert session._diagnosis._text.content == before
+    go_to(page, "Pixel")
+    page.get_by_text("Pixel row 20, column 30.").wait_for()
+    go_to(page, "Tune")
+    wait_until(lambda: not session._diagnosis._shown)
+
+
+def test_two_pictures_are_split_at_the_divider_or_subtracted(page: Any, app: App) -> None:
+    session = enter(page, app, "Compare")
+    one = colours_on_screen(page, (48, 64)).astype(int)
+    view = session._compare
+    choose(page, view._against, "linearized")
+    wait_until(lambda: session._read().against == "linearized")
+    page.get_by_text("Left: input by robust. Right: linearized by robust.").wait_for()
+
+    def apart() -> tuple[int, int]:
+        """Largest difference to the first picture in its half, and in the other."""
+        shown = colours_on_screen(page, (48, 64)).astype(int)
+        return abs(shown - one)[:, :30].max(), abs(shown - one)[:, 34:].max()
+
+    wait_until(lambda: apart()[0] <= 1)
+    assert apart()[1] > 20
+    press(page, "b")  # all of one
+    wait_until(lambda: max(apart()) <= 1)
+    press(page, "b")  # all of the other
+    wait_until(lambda: min(apart()) > 20)
+    choose(page, view._against, "input")
+    view._difference.value = True
+    session._wake.set()
+    wait_until(lambda: colours_on_screen(page, (48, 64)).max() == 0)
+
+
+def test_a_click_on_the_map_moves_both_sliders(page: Any, app: App) -> None:
+    session = enter(page, app, "Map")
+    before = session._read().thresholds
+    picture = page.locator("#photolin-landscape")
+    picture.wait_for(timeout=60_000)
+    box = picture.bounding_box()
+    page.mouse.click(box["x"] + 0.7 * box["width"], box["y"] + 0.2 * box["height"])
+    wait_until(lambda: session._read().thresholds != before)
+    found = session._read().thresholds
+    assert isinstance(found, Thresholds)
+    assert found.T > before.T
+    assert found.Ts > before.Ts
