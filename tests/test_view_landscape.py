@@ -67,6 +67,9 @@ class FakeClicks:
         self.clicked[name], self.seen[name] = clicked, seen
         return f"photolin-{name}"
 
+    def see(self, name: str, seen: Any) -> str:
+        return self.watch(name, lambda x, y: None, seen)
+
 
 @dataclass
 class Watched:
