@@ -360,6 +360,7 @@ def test_in_3d_keys_turn_nothing_and_fit_double_click_and_window_keep_the_surfac
     assert camera_matrix(page) == pytest.approx(fitted, abs=1e-6)
 
     turn(page, 100, 40)
+    rest(page)  # the camera glides on a little
     rotation = camera_rotation(page)
     corners = [on_screen(page, depth, pixel) for pixel in ((15, 80), (105, 80))]
     page.set_viewport_size({"width": 820, "height": 640})
