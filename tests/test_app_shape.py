@@ -170,7 +170,7 @@ def rest(page: Any) -> None:
     while True:
         page.wait_for_timeout(150)
         now = camera_matrix(page)
-        if np.allclose(now, before, atol=1e-6):
+        if np.allclose(now, before, rtol=0, atol=1e-7):
             return
         assert time.monotonic() < end, "the camera does not rest"
         before = now
