@@ -107,7 +107,7 @@ def enter(page: Any, app: App, *, live: bool = False) -> Session:
     (number,) = set(app._sessions) - before
     session = app._sessions[number]
     wait_until(lambda: session._frame is not None)
-    session._thresholds._live.value = live
+    session._panels.thresholds._live.value = live
     wait_until(lambda: session._frame is not None and session._frame.state.live == live)
     return session
 
@@ -216,7 +216,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
 
 def test_labels_on_screen_follow_T_moved_by_keyboard(page: Any, app: App) -> None:
     session = enter(page, app)
-    T = session._thresholds._T
+    T = session._panels.thresholds._T
     wait_for_colours(page, blended(picture(0), RESULT.labels[0]), tolerance=1)
 
     thumb(page, T).focus()
@@ -238,7 +238,7 @@ def test_labels_on_screen_follow_T_moved_by_keyboard(page: Any, app: App) -> Non
 
 def test_after_dragging_T_the_last_value_wins_everywhere(page: Any, app: App) -> None:
     session = enter(page, app)
-    T = session._thresholds._T
+    T = session._panels.thresholds._T
     click_pixel(page, 30, 20)
     wait_until(lambda: session._pixel == (30, 20))
     press(page, "ArrowUp")
@@ -334,7 +334,7 @@ def test_dragging_T_for_five_seconds_shows_linearizations_and_ends_in_the_last(
         draw(encoded)
 
     session._canvas.set_overlay = record
-    T = session._thresholds._T
+    T = session._panels.thresholds._T
     track, knob = widget(page, T).bounding_box(), thumb(page, T).bounding_box()
     middle = knob["y"] + knob["height"] / 2
     page.mouse.move(knob["x"] + knob["width"] / 2, middle)
@@ -366,15 +366,15 @@ def test_suggested_thresholds_reach_sliders_and_screen(page: Any, app: App) -> N
     suggested = analyze(STACK, Options(samples=50)).thresholds
     wait_until(lambda: session._read().thresholds == suggested)
     wait_for_colours(page, blended(picture(0), labels_at(session)), tolerance=1)
-    assert number(page, session._thresholds._T) == suggested.T
+    assert number(page, session._panels.thresholds._T) == suggested.T
 
 
 def test_thresholds_beyond_the_sliders_widen_them(page: Any, open_app: OpenApp) -> None:
     wide = replace(RESULT, thresholds=Thresholds(0.6, 0.0))
     session = enter(page, open_app(result=wide))
     assert session._read().thresholds == Thresholds(0.6, 0.0)
-    assert number(page, session._thresholds._T) == 0.6
-    thumb(page, session._thresholds._T).focus()
+    assert number(page, session._panels.thresholds._T) == 0.6
+    thumb(page, session._panels.thresholds._T).focus()
     press(page, "ArrowLeft")
     wait_until(lambda: abs(session._read().T - 0.5995) < 1e-9)
 
@@ -433,7 +433,7 @@ def test_a_click_tells_why_and_the_scatter_follows_T(page: Any, app: App) -> Non
 
 def test_images_and_layers_are_the_stack_and_the_backend(page: Any, app: App) -> None:
     session = enter(page, app)
-    view, legend_view = session._picture, session._legend
+    view, legend_view = session._panels.picture, session._panels.legend
     page.get_by_role("button", name="previous").click()
     wait_until(lambda: view._image.value == 7)
     wait_for_colours(page, blended(picture(7), RESULT.labels[7]), tolerance=1)
@@ -473,7 +473,7 @@ def test_images_and_layers_are_the_stack_and_the_backend(page: Any, app: App) ->
     thumb(page, legend_view._gain).focus()
     press(page, "ArrowRight", "ArrowRight")
     gain = legend_view._gain
-    wait_until(lambda: gain.value == pytest.approx(session._legend._first_gain + 0.2))
+    wait_until(lambda: gain.value == pytest.approx(session._panels.legend._first_gain + 0.2))
     wait_for_colours(page, np.repeat(picture(2, gain.value)[..., None], 3, axis=2))
 
 
@@ -488,8 +488,8 @@ def test_classes_are_switched_and_outlined(page: Any, app: App) -> None:
     expected = np.where(cast[..., None], below, painted(RESULT.labels[0]))
     wait_for_colours(page, expected)
     press(page, "4", "ArrowDown")
-    widget(page, session._legend._switches[Factor.SPECULAR]).click()
-    widget(page, session._legend._outlines).click()
+    widget(page, session._panels.legend._switches[Factor.SPECULAR]).click()
+    widget(page, session._panels.legend._outlines).click()
     look = {"shown": frozenset(Factor) - {Factor.SPECULAR}, "outlines": True}
     wait_for_colours(page, blended(picture(0), RESULT.labels[0], **look), tolerance=1)
 
@@ -499,7 +499,7 @@ def test_what_is_used_together_is_seen_together_in_a_small_window(page: Any, app
     click_pixel(page, 30, 20)
     page.locator("svg[role=img]").wait_for()
     page.set_viewport_size({"width": 1280, "height": 720})
-    views = session._picture, session._thresholds, session._thresholds
+    views = session._panels.picture, session._panels.thresholds, session._panels.thresholds
     for view, name in zip(views, ("_image", "_T", "_Ts"), strict=True):
         box = widget(page, getattr(view, name)).bounding_box()
         assert 0 < box["y"] < 720 - box["height"]
@@ -515,7 +515,11 @@ def test_the_scroll_bar_covers_no_widget(page: Any, app: App) -> None:
     bar = bar.filter(visible=True)
     bar.wait_for()
     left = bar.bounding_box()["x"]
-    for handle in (session._picture._layer, session._run._method, session._pixel_view._beside):
+    for handle in (
+        session._panels.picture._layer,
+        session._panels.run._method,
+        session._panels.pixel._beside,
+    ):
         box = widget(page, handle).bounding_box()
         assert box["x"] + box["width"] <= left
 
@@ -526,7 +530,7 @@ def test_the_scroll_bar_covers_no_widget(page: Any, app: App) -> None:
 def test_keys_reach_the_picture_after_any_use_of_the_pointer(page: Any, app: App) -> None:
     session = enter(page, app)
     page.set_viewport_size({"width": 1280, "height": 900})
-    view, legend_view = session._picture, session._legend
+    view, legend_view = session._panels.picture, session._panels.legend
 
     def use_switch() -> None:
         widget(page, legend_view._switches[Factor.UNDEFINED]).click()
@@ -560,7 +564,7 @@ def test_a_list_has_the_keys_while_it_is_open_and_the_picture_afterwards(
     page: Any, app: App
 ) -> None:
     session = enter(page, app)
-    layer, image = session._picture._layer, session._picture._image
+    layer, image = session._panels.picture._layer, session._panels.picture._image
     for end in ("Enter", "Escape"):
         before = image.value
         widget(page, layer).click()
@@ -583,21 +587,21 @@ def test_a_number_being_typed_has_its_keys_and_tab_goes_from_widget_to_widget(
     page: Any, app: App
 ) -> None:
     session = enter(page, app)
-    T = session._thresholds._T
+    T = session._panels.thresholds._T
     field = widget(page, T).locator("xpath=..").locator("input:not([type=hidden])")
     field.click()
     press(page, "Home", "ArrowRight", "1")
     page.wait_for_timeout(200)
-    assert session._picture._image.value == 0
+    assert session._panels.picture._image.value == 0
     assert session._read().shown == frozenset(Factor)
     field.fill("0.03")
     wait_until(lambda: T.value == 0.03)
     thumb(page, T).focus()
     press(page, "Tab", "Tab")
-    assert thumb(page, session._thresholds._Ts).evaluate("e => e === document.activeElement")
+    assert thumb(page, session._panels.thresholds._Ts).evaluate("e => e === document.activeElement")
     press(page, "ArrowRight")  # reached by keyboard, the slider has its arrows
-    wait_until(lambda: session._thresholds._Ts.value > 0.02)
-    assert session._picture._image.value == 0
+    wait_until(lambda: session._panels.thresholds._Ts.value > 0.02)
+    assert session._panels.picture._image.value == 0
 
 
 # --- tabs ---
@@ -660,7 +664,7 @@ def test_hostile_values_change_no_other_tab(page: Any, app: App) -> None:
     press(page, "ArrowUp")
     expected = painted(RESULT.labels[0])
     wait_for_colours(page, expected)
-    T = session._thresholds._T
+    T = session._panels.thresholds._T
     origin = app.server.url.rstrip("/")
     with connect(
         origin.replace("http", "ws"),
@@ -751,13 +755,13 @@ def test_methods_are_computed_once_and_kept_even_if_asked_for_while_one_runs(
 
     plots = page.locator("svg[role=img]")
     assert plots.count() == 1
-    choose(page, session._pixel_view._beside, "robust")
+    choose(page, session._panels.pixel._beside, "robust")
     wait_until(lambda: plots.count() == 2)
     assert [plots.nth(k).locator("text").first.text_content() for k in (0, 1)] == [
         "statistical",
         "robust",
     ]
-    choose(page, session._run._method, "robust")  # beside itself: one plot
+    choose(page, session._panels.run._method, "robust")  # beside itself: one plot
     wait_until(lambda: plots.count() == 1)
     assert len(gate.began) == 2
 
@@ -766,7 +770,7 @@ def test_two_methods_are_compared_in_percentages_plots_and_sentences(
     page: Any, open_app: OpenApp
 ) -> None:
     session = enter(page, open_app(result=RESULT))
-    choose(page, session._pixel_view._beside, "statistical")
+    choose(page, session._panels.pixel._beside, "statistical")
     wait_for_text(page, "Click a pixel to see why robust and statistical label it as they do.")
     wait_until(lambda: "statistical" in session._work.results)
     other = session._work.results["statistical"]
@@ -805,9 +809,9 @@ def test_a_first_run_that_is_cancelled_says_how_to_go_on(
 
 def save(page: Any, session: Session, kind: str, images: str) -> tuple[str, bytes]:
     """Choose and press Download; the file's name and bytes."""
-    choose(page, session._export._kind, kind)
+    choose(page, session._panels.export._kind, kind)
     if images:
-        choose(page, session._export._images, images)
+        choose(page, session._panels.export._images, images)
     with page.expect_download() as started:
         page.get_by_role("button", name="Download", exact=True).click()
     with open(started.value.path(), "rb") as file:
@@ -850,7 +854,7 @@ def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App, tmp_path
 
     name, data = save(page, session, "result (npz and json, zip)", "")
     assert name == "sphere_cone_result.zip"
-    assert widget(page, session._export._images).is_disabled()
+    assert widget(page, session._panels.export._images).is_disabled()
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         archive.extractall(tmp_path)
     opened = load_result(tmp_path)
@@ -858,8 +862,8 @@ def test_downloads_decode_to_what_the_screen_shows(page: Any, app: App, tmp_path
     assert np.array_equal(opened.linearized_bases, RESULT.linearized_bases, equal_nan=True)
     assert opened.thresholds == state.thresholds
 
-    choose(page, session._export._kind, "masks (PNG, zip)")
-    wait_until(lambda: widget(page, session._export._images).is_enabled())
+    choose(page, session._panels.export._kind, "masks (PNG, zip)")
+    wait_until(lambda: widget(page, session._panels.export._images).is_enabled())
 
 
 # --- what goes wrong ---
@@ -895,7 +899,7 @@ def test_a_fault_of_the_program_is_told_and_the_tool_goes_on(
         raise RuntimeError("gone wrong")
 
     for owner, name, key in (
-        (session._thresholds, "set", "s"),  # in the job
+        (session._panels.thresholds, "set", "s"),  # in the job
         (session._painter, "paint", "ArrowRight"),  # in the worker
         (session._client, "send_file_download", "e"),
     ):
@@ -907,7 +911,7 @@ def test_a_fault_of_the_program_is_told_and_the_tool_goes_on(
             assert "RuntimeError: gone wrong" in note.inner_text()
             note.get_by_role("button").click()
             note.wait_for(state="detached")
-    monkeypatch.setitem(session._keys, "m", fail)  # in a callback
+    monkeypatch.setitem(session._panels._keys, "m", fail)  # in a callback
     press(page, "m")
     wait_for_text(page, "RuntimeError: gone wrong")
     assert capfd.readouterr().err.count("RuntimeError: gone wrong") == 4

@@ -49,7 +49,7 @@ def enter(page: Any, app: App, tab: str) -> Session:
     wait_until(lambda: len(app._sessions) == 1)
     (session,) = app._sessions.values()
     wait_until(lambda: session._frame is not None)
-    session._thresholds._live.value = False
+    session._panels.thresholds._live.value = False
     go_to(page, tab)
     return session
 
@@ -73,7 +73,7 @@ def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, 
         push(page, kind)
         for row, column in pixels.tolist():
             click_pixel(page, row, column)
-            wait_until(lambda r=row, c=column: (r, c, kind) in session._samples.marks)  # noqa: B023
+            wait_until(lambda r=row, c=column: (r, c, kind) in session._panels.samples.marks)  # noqa: B023
             part = STACK.images[0, row - 2 : row + 3, column - 2 : column + 3]
             taken.append((kind, part.ravel()))
     both = [np.concatenate([p for k, p in taken if k == kind]) for kind in clicks]
@@ -82,7 +82,7 @@ def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, 
     page.get_by_text("50 shadow, 25 lit sampled").wait_for()
     push(page, "Set Ts")
     wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    wait_until(lambda: session._thresholds._history.now.Ts == pytest.approx(expected))
+    wait_until(lambda: session._panels.thresholds._history.now.Ts == pytest.approx(expected))
     press(page, "z")
     wait_until(lambda: session._read().thresholds == before)
     press(page, "Shift+Z")
@@ -99,7 +99,7 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     seen = [first]
     for _ in range(2):
         press(page, "]")
-        wait_until(lambda: session._thresholds._history.now == session._read().thresholds)
+        wait_until(lambda: session._panels.thresholds._history.now == session._read().thresholds)
         seen.append(session._read().thresholds)
     assert len(set(seen)) == 3
     press(page, "z")
@@ -110,7 +110,7 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     wait_until(lambda: session._read().thresholds == seen[2])
     push(page, "reset")
     wait_until(lambda: session._read().thresholds == first)
-    wait_until(lambda: session._thresholds._history.now == first)
+    wait_until(lambda: session._panels.thresholds._history.now == first)
     press(page, "z")
     wait_until(lambda: session._read().thresholds == seen[2])
 
@@ -142,22 +142,22 @@ def test_a_panel_out_of_view_is_not_drawn_and_up_to_date_once_it_is_opened(
     page: Any, app: App
 ) -> None:
     session = enter(page, app, "Tune")
-    before = session._diagnosis._text.content
+    before = session._panels.diagnosis._text.content
     click_pixel(page, 20, 30)
     wait_until(lambda: session._frame is not None and session._frame.state.pixel == (20, 30))
     press(page, "ArrowRight")
     wait_until(lambda: session._frame is not None and session._frame.state.image == 1)
-    assert session._diagnosis._text.content == before
+    assert session._panels.diagnosis._text.content == before
     go_to(page, "Pixel")
     page.get_by_text("Pixel row 20, column 30.").wait_for()
     go_to(page, "Tune")
-    wait_until(lambda: not session._diagnosis._shown)
+    wait_until(lambda: not session._panels.diagnosis._shown)
 
 
 def test_two_pictures_are_split_at_the_divider_or_subtracted(page: Any, app: App) -> None:
     session = enter(page, app, "Compare")
     one = colours_on_screen(page, (48, 64)).astype(int)
-    view = session._compare
+    view = session._panels.compare
     choose(page, view._against, "linearized")
     wait_until(lambda: session._read().against == "linearized")
     page.get_by_text("Left: input by robust. Right: linearized by robust.").wait_for()

@@ -109,7 +109,7 @@ def dismiss_notes(page: Any) -> None:
 def click_all(page: Any, session: Session, pixels: tuple[tuple[int, int], ...]) -> None:
     for pixel in pixels:
         click_pixel(page, *pixel)
-        wait_until(lambda p=pixel: any(mark[:2] == p for mark in session._shape_view.marks))
+        wait_until(lambda p=pixel: any(mark[:2] == p for mark in session._panels.shape.marks))
 
 
 def recovered(session: Session) -> Recovered:
@@ -122,8 +122,8 @@ def recovered(session: Session) -> Recovered:
 
 def recover(page: Any, session: Session) -> Recovered:
     """A shape by all pixels of the sphere."""
-    session._shape_view._known.value = "a whole sphere"
-    for handle, value in zip(session._shape_view._numbers, (59.5, 79.5, RADIUS), strict=True):
+    session._panels.shape._known.value = "a whole sphere"
+    for handle, value in zip(session._panels.shape._numbers, (59.5, 79.5, RADIUS), strict=True):
         handle.value = value
     press(page, "n")
     return recovered(session)
@@ -218,10 +218,10 @@ def test_three_clicks_on_the_rim_and_five_on_the_sphere_give_its_shape(
     page: Any, open_app: OpenApp
 ) -> None:
     session = enter(page, open_app())
-    choose(page, session._shape_view._known, "points on a sphere")
+    choose(page, session._panels.shape._known, "points on a sphere")
     push(page, "outline")
     click_all(page, session, RIM)
-    wait_until(lambda: session._shape_view._numbers[2].value == pytest.approx(RADIUS, abs=1))
+    wait_until(lambda: session._panels.shape._numbers[2].value == pytest.approx(RADIUS, abs=1))
     push(page, "points")
     click_all(page, session, FIVE[:4])
     assert session._work.recovered is None
@@ -244,7 +244,7 @@ def test_a_click_on_the_surface_selects_the_pixel_that_is_seen_there(
     session = enter(page, open_app())
     depth = recover(page, session).shape.depth
     assert depth is not None
-    session._shape_view._arrows.value = False
+    session._panels.shape._arrows.value = False
     turn_on(page)
     rest(page)
     worst = 0
@@ -274,7 +274,7 @@ def test_each_pixel_of_the_picture_lies_on_its_point_of_the_surface(
     session = enter(page, open_app())
     shape = recover(page, session).shape
     assert shape.depth is not None
-    session._shape_view._arrows.value = False
+    session._panels.shape._arrows.value = False
     press(page, "ArrowUp", "ArrowUp")  # from relit to normals, whose colours tell all sides apart
     wait_until(lambda: session._frame is not None and session._frame.state.layer == "normals")
     turn_on(page)
@@ -380,7 +380,7 @@ def test_the_surface_of_half_a_megapixel_appears(page: Any, open_app: OpenApp) -
     scene = render_scene("sphere_obstacles", size=(512, 512), images=8)
     result = analyze(scene.stack, OPTIONS)
     session = enter(page, open_app(scene.stack, result))
-    session._shape_view._known.value = "nothing"
+    session._panels.shape._known.value = "nothing"
     press(page, "n")
     recovered(session)
     page.wait_for_timeout(500)
@@ -431,8 +431,8 @@ def test_what_does_not_work_is_told_in_the_words_of_the_command_line(
     page: Any, open_app: OpenApp
 ) -> None:
     session = enter(page, open_app())
-    choose(page, session._shape_view._known, "points on a sphere")
-    for handle, value in zip(session._shape_view._numbers, (59.5, 79.5, RADIUS), strict=True):
+    choose(page, session._panels.shape._known, "points on a sphere")
+    for handle, value in zip(session._panels.shape._numbers, (59.5, 79.5, RADIUS), strict=True):
         handle.value = value
     push(page, "points")
     click_all(page, session, ((60, 60), (60, 70), (60, 80), (60, 90), (60, 100)))
@@ -456,7 +456,7 @@ def test_a_shape_of_other_thresholds_says_so_until_it_is_recovered_again(
 ) -> None:
     session = enter(page, open_app())
     recover(page, session)
-    session._thresholds._T.value = 0.08
+    session._panels.thresholds._T.value = 0.08
     session._wake.set()
     wait_for_text(page, "This shape is of T 0.0500, Ts 0.0200; recover again")
     wait_until(lambda: session._work.results["robust"].thresholds.T == 0.08)
@@ -471,8 +471,8 @@ def test_files_of_the_shape_are_what_is_on_screen(
 ) -> None:
     session = enter(page, open_app())
     page.get_by_role("tab", name="Export").click()
-    choose(page, session._export._kind, "shape (normals, albedo, depth, mesh, lights; zip)")
-    wait_until(lambda: session._export._images.disabled)
+    choose(page, session._panels.export._kind, "shape (normals, albedo, depth, mesh, lights; zip)")
+    wait_until(lambda: session._panels.export._images.disabled)
     press(page, "e")
     wait_for_text(page, "there is no shape yet; recover one in the tab Shape (key: N)")
     found = recover(page, session)
@@ -491,7 +491,7 @@ def test_with_lights_the_shape_takes_them(page: Any, open_app: OpenApp) -> None:
     lights = SCENE.truth.lights * SCENE.truth.power[:, None]
     stack, result = replace(STACK, lights=lights), replace(RESULT, lights=lights)
     session = enter(page, open_app(stack, result))
-    assert session._shape_view._known.value == "the lights of the stack"
+    assert session._panels.shape._known.value == "the lights of the stack"
     page.get_by_role("button", name="Recover shape").click()
     shape = recovered(session).shape
     assert np.array_equal(shape.resolved.matrix, resolve_ambiguity(result).matrix)

@@ -7,9 +7,6 @@ own and reports through the same worker.
 """
 
 import traceback
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
 from threading import Event, Thread
 from time import monotonic
 from typing import Literal
@@ -18,31 +15,17 @@ import viser
 
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, PhotolinError
-from photolin.factors import LETTERS, Factor, Thresholds
+from photolin.factors import Thresholds
 
 from .canvas import Canvas, Window
 from .catch_up import CatchUp
-from .clicks import Clicks
 from .downloads import Pack
 from .frame import Frame, compose
 from .live import Live, Preview
 from .painter import Painter
+from .panels import Actions, Panels
 from .runs import Runs
 from .state import MOST_PINS, SURFACE, Pixel, ViewState
-from .views.compare import CompareView
-from .views.diagnosis import DiagnosisView
-from .views.export import ExportView
-from .views.help import HelpView
-from .views.landscape import LandscapeView
-from .views.legend import LegendView
-from .views.picture import PictureView
-from .views.pixel import PixelView
-from .views.run import RunView
-from .views.samples import SamplesView
-from .views.shape import ShapeView
-from .views.shares import SharesView
-from .views.summary import SummaryView
-from .views.thresholds import ThresholdView
 from .work import Desk, Work
 
 REST = 0.3
@@ -83,54 +66,21 @@ class Session:
         """Stop all work for the tab."""
         self._closed.set()
         self._work.close()
-        self._landscape.close()
+        self._panels.close()
         self._catch_up.close()
         self._wake.set()
 
     def _build(self, client: viser.ClientHandle) -> None:
         _, H, W = self._stack.shape
-        gui, changed, clicks = client.gui, self._wake.set, Clicks(client)
+        gui = client.gui
         gui.configure_theme(
             control_width="large", show_logo=False, show_share_button=False, dark_mode=True
         )
         gui.main_panel.dock_right()
         self._canvas = canvas = Canvas(client, H, W)
         self._painter = Painter(canvas)
-        tabs = gui.add_tab_group()
-        with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
-            self._picture = PictureView(gui, self._stack, changed, canvas.fit, canvas.one_to_one)
-            self._thresholds = ThresholdView(
-                gui, self._first, changed, self._work.suggest, self._work.linearize
-            )
-            self._run = RunView(gui, self._runs.options.method, changed, self._work.stop)
-            self._shares = SharesView(gui)
-            self._pixel_view = PixelView(gui, changed)
-            with gui.add_folder("Display"):
-                self._legend = LegendView(gui, self._stack, changed)
-            with gui.add_folder("About this result"):
-                self._summary = SummaryView(gui)
-        with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
-            self._thresholds.add_steps(gui)
-            self._samples = SamplesView(gui, clicks, self._stack, self._resample, self._set_Ts)
-        with tabs.add_tab("Map", viser.Icon.MAP):
-            self._landscape = LandscapeView(gui, clicks, self._stack, self._move, self._tell)
-        with tabs.add_tab("Pixel", viser.Icon.TARGET):
-            self._diagnosis = DiagnosisView(gui, clicks, self._pin, self._unpin, self._picture.go)
-        with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
-            self._compare = CompareView(gui, changed)
-        with tabs.add_tab("Shape", viser.Icon.CUBE):
-            self._shape_view = ShapeView(gui, self._stack, changed, self._recover)
-        with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
-            self._export = ExportView(gui, self._work.download)
-        with tabs.add_tab("Help", viser.Icon.HELP):
-            HelpView(gui)
-        both = (self._picture, self._thresholds, self._pixel_view)
-        self._readers = (self._run, *both, self._legend, self._compare, self._shape_view)
-        self._drawers = (
-            *(*both, self._samples, self._landscape, self._shares, self._summary),
-            *(self._diagnosis, self._compare, self._shape_view),
-        )
-        self._keys = self._bind_keys()
+        method = self._runs.options.method
+        self._panels = Panels(client, canvas, self._stack, method, self._first, self._actions())
         canvas.on_pick(self._pick)
         canvas.on_hover(self._point)
         canvas.on_key(self._press)
@@ -138,6 +88,20 @@ class Session:
         canvas.on_light(self._shine)
 
     # --- what the work does ---
+
+    def _actions(self) -> Actions:
+        return Actions(
+            changed=self._wake.set,
+            suggest=self._work.suggest,
+            linearize=self._work.linearize,
+            stop=self._work.stop,
+            download=self._work.download,
+            recover=self._recover,
+            resample=self._resample,
+            pin=self._pin,
+            unpin=self._unpin,
+            tell=self._tell,
+        )
 
     def _desk(self) -> Desk:
         return Desk(
@@ -154,25 +118,25 @@ class Session:
         )
 
     def _start(self, thresholds: Thresholds) -> None:
-        self._thresholds.begin(thresholds)
+        self._panels.thresholds.begin(thresholds)
 
     def _move(self, thresholds: Thresholds) -> None:
-        self._thresholds.set(thresholds)
+        self._panels.thresholds.set(thresholds)
 
     def _busy(self, running: bool) -> None:
-        self._run.busy(running)
+        self._panels.run.busy(running)
 
     def _progress(self, stage: str, fraction: float) -> None:
-        self._run.progress(stage, fraction)
+        self._panels.run.progress(stage, fraction)
 
     def _send(self, name: str, data: bytes) -> None:
         # viser's page itself tells the name and the size
         self._client.send_file_download(name, data, save_immediately=True)
 
     def _shaped(self) -> None:
-        self._picture.offer(surface=True)
+        self._panels.picture.offer(surface=True)
         if self._read().layer not in SURFACE:
-            self._picture.show("relit")
+            self._panels.picture.show("relit")
         self._wake.set()
 
     def _refuse(self) -> None:
@@ -180,61 +144,27 @@ class Session:
 
     # --- what the user does ---
 
-    def _bind_keys(self) -> dict[str, Callable[[], object]]:
-        classes: dict[str, Callable[[], object]] = {
-            number: partial(self._legend.toggle, factor)
-            for number, factor in zip("12345", LETTERS, strict=True)
-        }
-        return classes | {
-            "arrowleft": partial(self._picture.step, -1),
-            "arrowright": partial(self._picture.step, 1),
-            "arrowup": partial(self._picture.turn, -1),
-            "arrowdown": partial(self._picture.turn, 1),
-            "[": partial(self._thresholds.nudge, T=-1),
-            "]": partial(self._thresholds.nudge, T=1),
-            "{": partial(self._thresholds.nudge, Ts=-1),
-            "}": partial(self._thresholds.nudge, Ts=1),
-            "z": self._thresholds.undo,
-            "Z": self._thresholds.redo,
-            "m": self._run.turn,
-            "r": self._work.linearize,
-            "s": self._work.suggest,
-            "e": lambda: self._work.download(*self._export.chosen()),
-            "p": self._pin,
-            "b": self._compare.flicker,
-            "x": partial(self._diagnosis.next, Factor.SPECULAR),
-            "u": partial(self._diagnosis.next, Factor.UNDEFINED),
-            "n": self._recover,
-            "d": self._shape_view.toggle,
-            "escape": self._work.stop,
-        }
-
     def _press(self, key: str) -> None:
-        if (action := self._keys.get(key, self._keys.get(key.lower()))) is None:
-            return
         try:
-            action()
+            self._panels.press(key)
         except Exception as error:
             self._report(error)
 
     def _recover(self) -> None:
-        view = self._shape_view
+        view = self._panels.shape
         try:
             self._work.recover(view.known(), view.given_lights(), view.px_mm())
         except PhotolinError as error:
             self._tell(error)
 
     def _pick(self, pixel: Pixel) -> None:
-        if not (self._shape_view.take(pixel) or self._samples.take(pixel)):
+        if not self._panels.take(pixel):
             self._pixel = pixel
             self._wake.set()
 
-    def _set_Ts(self, Ts: float) -> None:
-        self._thresholds.set(replace(self._read().thresholds, Ts=Ts))
-
     def _resample(self) -> None:
         if self._frame is not None:
-            self._samples.draw(self._frame)
+            self._panels.samples.draw(self._frame)
         self._wake.set()
 
     def _pin(self) -> None:
@@ -279,9 +209,7 @@ class Session:
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""
         state = ViewState(pixel=self._pixel, pins=self._pins, light=self._light)
-        for view in self._readers:
-            state = view.read(state)
-        return state
+        return self._panels.read(state)
 
     def _round(self) -> bool:
         """Read all widgets and draw what differs; true when something better is to come."""
@@ -289,12 +217,12 @@ class Session:
         if frame is None or state != frame.state:
             self._changed = monotonic()
         rested = monotonic() - self._changed >= REST
-        moving = self._thresholds.settle(state.thresholds, rested)
+        moving = self._panels.thresholds.settle(state.thresholds, rested)
         self._work.ensure(state)
         preview = self._follow(state, results)
         recovered = self._work.recovered
         pins = tuple((*pin, str(n)) for n, pin in enumerate(self._pins, 1))
-        marks = (*pins, *self._shape_view.marks, *self._samples.marks)
+        marks = (*pins, *self._panels.marks())
         known = (
             frame is not None
             and (state, recovered) == (frame.state, frame.recovered)
@@ -304,8 +232,7 @@ class Session:
             self._frame = frame = compose(self._stack, results, state, preview, recovered)
             self._shown_results = results
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
-            for view in self._drawers:
-                view.draw(frame)
+            self._panels.draw(frame)
         else:
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
         return self._catch_up.pursue(state, results.get(state.method), rested) or rough or moving

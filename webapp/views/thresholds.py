@@ -127,6 +127,10 @@ class ThresholdView:
             handle.min, handle.max = min(handle.min, value), max(handle.max, value)
             handle.value = value
 
+    def set_Ts(self, Ts: float) -> None:
+        """Move the slider Ts."""
+        self.set(replace(self.read(ViewState()).thresholds, Ts=Ts))
+
     def nudge(self, T: int = 0, Ts: int = 0) -> None:
         """Move a slider by a tenth of its value, at least one step, `T` or `Ts` times."""
         for handle, times in ((self._T, T), (self._Ts, Ts)):

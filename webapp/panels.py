@@ -1,0 +1,168 @@
+"""The panels of one tab and the keys that work them: built once, read and drawn as one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import viser
+
+from photolin.analysis import Method
+from photolin.factors import LETTERS, Factor, Thresholds
+from photolin.stack import ImageStack
+
+from .canvas import Canvas
+from .clicks import Clicks
+from .frame import Frame
+from .state import Pixel, ViewState
+from .views.compare import CompareView
+from .views.diagnosis import DiagnosisView
+from .views.export import ExportView
+from .views.help import HelpView
+from .views.landscape import LandscapeView
+from .views.legend import LegendView
+from .views.picture import PictureView
+from .views.pixel import PixelView
+from .views.run import RunView
+from .views.samples import SamplesView
+from .views.shape import ShapeView
+from .views.shares import SharesView
+from .views.summary import SummaryView
+from .views.thresholds import ThresholdView
+
+
+@dataclass(frozen=True)
+class Actions:
+    """What panels and keys ask their tab to do; all return at once."""
+
+    changed: Callable[[], None]
+    """Read all widgets again, and draw what differs."""
+    suggest: Callable[[], None]
+    """Set T and Ts to what the data suggest."""
+    linearize: Callable[[], None]
+    """Linearize again with T and Ts as they stand."""
+    stop: Callable[[], None]
+    """Stop the long work."""
+    download: Callable[[str, bool], None]
+    """Send files of a kind, of all images or of the one shown."""
+    recover: Callable[[], None]
+    """Recover the shape."""
+    resample: Callable[[], None]
+    """Draw the samples again."""
+    pin: Callable[[], None]
+    """Pin the selected pixel, or take its pin away."""
+    unpin: Callable[[], None]
+    """Take all pins away."""
+    tell: Callable[[Exception], None]
+    """Say what went wrong."""
+
+
+class Panels:
+    """All widgets of a tab."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        canvas: Canvas,
+        stack: ImageStack,
+        method: Method,
+        first: Thresholds,
+        actions: Actions,
+    ) -> None:
+        """Build them.
+
+        Args:
+            method: whose result is shown at first.
+            first: where the sliders stand at first.
+        """
+        gui, changed, clicks = client.gui, actions.changed, Clicks(client)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
+            self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
+            self.thresholds = ThresholdView(gui, first, changed, actions.suggest, actions.linearize)
+            self.run = RunView(gui, method, changed, actions.stop)
+            shares = SharesView(gui)
+            self.pixel = PixelView(gui, changed)
+            with gui.add_folder("Display"):
+                self.legend = LegendView(gui, stack, changed)
+            with gui.add_folder("About this result"):
+                summary = SummaryView(gui)
+        with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
+            self.thresholds.add_steps(gui)
+            self.samples = SamplesView(gui, clicks, stack, actions.resample, self.thresholds.set_Ts)
+        with tabs.add_tab("Map", viser.Icon.MAP):
+            self.landscape = LandscapeView(gui, clicks, stack, self.thresholds.set, actions.tell)
+        with tabs.add_tab("Pixel", viser.Icon.TARGET):
+            self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
+        with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
+            self.compare = CompareView(gui, changed)
+        with tabs.add_tab("Shape", viser.Icon.CUBE):
+            self.shape = ShapeView(gui, stack, changed, actions.recover)
+        with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
+            self.export = ExportView(gui, actions.download)
+        with tabs.add_tab("Help", viser.Icon.HELP):
+            HelpView(gui)
+        both = (self.picture, self.thresholds, self.pixel)
+        self._readers = (self.run, *both, self.legend, self.compare, self.shape)
+        self._drawers = (
+            *(*both, self.samples, self.landscape, shares, summary),
+            *(self.diagnosis, self.compare, self.shape),
+        )
+        self._keys = self._bind(actions)
+
+    def close(self) -> None:
+        """Stop what panels compute."""
+        self.landscape.close()
+
+    def read(self, state: ViewState) -> ViewState:
+        """The state with all that widgets stand for."""
+        for view in self._readers:
+            state = view.read(state)
+        return state
+
+    def draw(self, frame: Frame) -> None:
+        """Show a frame in all panels."""
+        for view in self._drawers:
+            view.draw(frame)
+
+    def take(self, pixel: Pixel) -> bool:
+        """Take a click on the picture where a panel asked for clicks; whether one did."""
+        return self.shape.take(pixel) or self.samples.take(pixel)
+
+    def marks(self) -> tuple[tuple[int, int, str], ...]:
+        """(row, column, text) of what was clicked for panels."""
+        return (*self.shape.marks, *self.samples.marks)
+
+    def press(self, key: str) -> None:
+        """Do what a key stands for, if anything."""
+        action = self._keys.get(key, self._keys.get(key.lower()))
+        if action is not None:
+            action()
+
+    def _bind(self, actions: Actions) -> dict[str, Callable[[], object]]:
+        classes: dict[str, Callable[[], object]] = {
+            number: partial(self.legend.toggle, factor)
+            for number, factor in zip("12345", LETTERS, strict=True)
+        }
+        return classes | {
+            "arrowleft": partial(self.picture.step, -1),
+            "arrowright": partial(self.picture.step, 1),
+            "arrowup": partial(self.picture.turn, -1),
+            "arrowdown": partial(self.picture.turn, 1),
+            "[": partial(self.thresholds.nudge, T=-1),
+            "]": partial(self.thresholds.nudge, T=1),
+            "{": partial(self.thresholds.nudge, Ts=-1),
+            "}": partial(self.thresholds.nudge, Ts=1),
+            "z": self.thresholds.undo,
+            "Z": self.thresholds.redo,
+            "m": self.run.turn,
+            "r": actions.linearize,
+            "s": actions.suggest,
+            "e": lambda: actions.download(*self.export.chosen()),
+            "p": actions.pin,
+            "b": self.compare.flicker,
+            "x": partial(self.diagnosis.next, Factor.SPECULAR),
+            "u": partial(self.diagnosis.next, Factor.UNDEFINED),
+            "n": actions.recover,
+            "d": self.shape.toggle,
+            "escape": actions.stop,
+        }
