@@ -144,6 +144,8 @@ class Work:
             self._desk.refuse()
 
     def _guarded(self, work: Callable[[], None]) -> None:
+        if self._job.closed:
+            return
         self._desk.busy(True)
         try:
             work()
