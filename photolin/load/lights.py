@@ -15,12 +15,13 @@ def read_lights(path: Path, names: tuple[str, ...]) -> NDArray[np.float64]:
 
     Text files hold a line ``x y z`` for each image, after an optional line with their count; in
     ``.lp`` files (RTI) a file name comes before the three numbers, which are scaled to length 1
-    because they may be positions. Lines with names are matched by name, whatever the ending, and
-    taken in order where none of the images is named. ``.npy`` holds (K,3) or (3,K).
+    because they may be positions. Lines with names are matched by name, whatever the ending;
+    they are taken in order where no image is named, or only some are, in that order. ``.npy``
+    holds (K,3) or (3,K).
 
     Raises:
         InputError: unreadable, a line that cannot be understood, another count than images, or
-            only some of the images are named.
+            names of some images in another order.
         DegenerateError: fewer than three independent directions.
     """
     if path.suffix.lower() == ".npy":
@@ -85,8 +86,8 @@ def _in_order_of(
     """The lights of `names`, by name where lines have those, else as they come.
 
     Raises:
-        InputError: some images are named and others are not, one is named twice, or lines hold
-            more than three numbers.
+        InputError: some images are named, in another order, and others are not; one is named
+            twice; or lines hold more than three numbers.
     """
     # lists made on another machine hold its full paths, with either kind of slash
     listed = [label.replace("\\", "/").rsplit("/", 1)[-1].lower() for label in labels]
@@ -94,24 +95,31 @@ def _in_order_of(
     found = _numbers_of(wanted, listed, path)
     stems = [_stem(name) for name in wanted]
     # pictures may have been converted since: the lines of img_1.jpg are those of img_1.png
-    if not found and len(set(stems)) == len(stems):
+    if not found:
         found = _numbers_of(stems, [_stem(name) for name in listed], path)
         wanted = stems
     if not found:
-        _check_columns(labels, path)
+        _check_columns(labels, names, path)
         return lights
-    missing = next((k for k, name in enumerate(wanted) if name not in found), None)
-    if missing is not None:
-        raise InputError(
-            f"{path}: names {len(found)} of {len(names)} images and not {names[missing]}; "
-            "a line for each image, or lines without names in their order, are accepted"
-        )
-    return lights[[found[name] for name in wanted]]
+    missing = [k for k, name in enumerate(wanted) if name not in found]
+    if not missing:
+        return lights[[found[name] for name in wanted]]
+    in_place = all(found.get(name, k) == k for k, name in enumerate(wanted))
+    # a file cannot hold every name as it is: those that it has tell whether it is in order
+    if in_place and len(lights) == len(names):
+        return lights
+    raise InputError(
+        f"{path}: names {len(found)} of {len(names)} images, in another order, and not "
+        f"{names[missing[0]]}; names of all images, or lines in their order, are accepted"
+    )
 
 
 def _numbers_of(wanted: list[str], listed: list[str], path: Path) -> dict[str, int]:
-    """Line number, from 0, of each of the names that is listed."""
+    """Line number, from 0, of each of the names that is listed; none where names are not unique."""
     known, found = set(wanted), dict[str, int]()
+    if len(known) < len(wanted):
+        return found
+    known.discard("")
     for n, name in enumerate(listed):
         if name in known and found.setdefault(name, n) != n:
             raise InputError(f"{path}: names {name} twice; one line for each image is accepted")
@@ -123,10 +131,12 @@ def _stem(name: str) -> str:
     return re.sub(r"\.[a-z][a-z0-9]*$", "", name)
 
 
-def _check_columns(labels: list[str], path: Path) -> None:
-    """Raise InputError where what comes before three numbers is numbers, too, but no count."""
+def _check_columns(labels: list[str], names: tuple[str, ...], path: Path) -> None:
+    """Raise InputError where numbers that are no name come before the three of a line."""
     for n, label in enumerate(labels, 1):
         words = label.split()
+        if label in names:
+            continue
         try:
             numbers = [float(word) for word in words]
         except ValueError:
