@@ -10,6 +10,7 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 import functools
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -19,6 +20,7 @@ import viser
 from photolin.shape.recover import Shape
 
 from .relief import MESH, Relief
+from .sketch import Sketch
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -119,6 +121,11 @@ class Canvas:
     def set_light(self, light: tuple[float, float] | None) -> None:
         """Show the ball on which a light is dragged, at x right, y up; None hides it."""
         call_javascript(self._client, "window.photolin.setLight", light)
+
+    def set_sketch(self, sketch: Sketch | None) -> None:
+        """Draw what is known of a sphere on the flat picture, in place of the earlier; or not."""
+        told = None if sketch is None else asdict(sketch)
+        call_javascript(self._client, "window.photolin.setSketch", told)
 
     def set_readout(self, text: str) -> None:
         """Write one line in the lower left corner; an empty text removes it."""

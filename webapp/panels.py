@@ -47,6 +47,8 @@ class Actions:
     """Send files of a kind, of all images or of the one shown."""
     recover: Callable[[], None]
     """Recover the shape."""
+    retract: Callable[[], None]
+    """Take back what was said of what did not work."""
     resample: Callable[[], None]
     """Draw the samples again."""
     pin: Callable[[], None]
@@ -106,7 +108,9 @@ class Panels:
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
             self.compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
-            self.shape = ShapeView(gui, stack, changed, actions.recover)
+            retry = (actions.recover, actions.retract)
+            self.shape = ShapeView(gui, stack, changed, *retry, canvas.set_sketch)
+            clicks.see("shape", self.shape.see)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self.export = ExportView(gui, actions.download)
             with gui.add_folder("Session"):
@@ -148,7 +152,7 @@ class Panels:
 
     def marks(self) -> tuple[tuple[int, int, str], ...]:
         """(row, column, text) of what was clicked for panels."""
-        return (*self.shape.marks, *self.samples.marks)
+        return self.samples.marks
 
     def press(self, key: str) -> None:
         """Do what a key stands for, if anything."""

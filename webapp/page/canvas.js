@@ -47,6 +47,7 @@ window.openCanvas = (options) => {
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
+  const sketch = openSketch({ ...page, camera });
   openInput({ ...page, camera });
 
   // --- before each frame ---
@@ -70,6 +71,7 @@ window.openCanvas = (options) => {
         }
       }),
     );
+    sketch.draw();
     marks.draw();
     tellView();
   }
@@ -142,6 +144,7 @@ window.openCanvas = (options) => {
     setOrbit: camera.setOrbit,
     setMarks: marks.setMarks,
     setLight: light.setLight,
+    setSketch: sketch.setSketch,
     setReadout: marks.setReadout,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,

@@ -4,16 +4,18 @@ from collections.abc import Callable
 
 import viser
 
+from photolin.export.maps import Convention
+
 from ..downloads import REPORT, SHAPE
 from ..values import choose_option
 
-RESULT = "result (npz and json, zip)"
-SURFACE = "shape (normals, albedo, depth, mesh, lights; zip)"
-PAGE = "report (one web page to send)"
+RESULT = "result (zip)"
+SURFACE = "shape (zip)"
+PAGE = "report (web page)"
 KINDS = {
-    "masks (PNG, zip)": "masks",
-    "label maps (indexed PNG, zip)": "labels",
-    "linearized (float32 TIFF)": "linearized",
+    "masks (PNG)": "masks",
+    "label maps (PNG)": "labels",
+    "linearized (TIFF)": "linearized",
     RESULT: "result",
     PAGE: REPORT,
     SURFACE: SHAPE,
@@ -29,8 +31,9 @@ TEXT = """
 - **report**: pictures, shares, settings, your notes and the command that makes the result again,
   as a single page that needs no network
 - **shape**: what `photolin shape` writes, once the tab Shape has recovered one. normals.tif,
-  albedo.tif and depth.tif are numbers, the PNGs to look at; mesh.ply and mesh.obj open in MeshLab
-  or Blender; lights.lp is for RTI. x is right, y up, z to the camera
+  albedo.tif (in colour where the images are) and depth.tif are numbers, the PNGs to look at;
+  mesh.ply and mesh.obj open in MeshLab or Blender; lights.lp is for RTI. x is right, y up, z to the
+  camera. The result is in it too
 
 Labels are by T and Ts as the sliders stand, of the method shown. Files go where the browser keeps
 its downloads.
@@ -46,16 +49,24 @@ class ExportView:
         self._images = gui.add_dropdown(
             "Of", (THIS, ALL), hint="Result, report and shape are of all images"
         )
+        self._directx = gui.add_checkbox(
+            "DirectX normals", False, visible=False, hint="Green is y down; else y up, as in OpenGL"
+        )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         gui.add_markdown(TEXT)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
+            self._directx.visible = self._kind.value == SURFACE
             self._images.disabled = self._kind.value in (RESULT, SURFACE, PAGE)
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:
             export(*self.chosen())
+
+    def convention(self) -> Convention:
+        """Of the picture of normals."""
+        return "directx" if self._directx.value is True else "opengl"
 
     def chosen(self) -> tuple[str, bool]:
         """The kind of files, and whether of all images."""
