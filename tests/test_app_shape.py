@@ -659,7 +659,7 @@ def test_files_of_the_shape_are_what_is_on_screen(
 ) -> None:
     session = enter(page, open_app())
     page.get_by_role("tab", name="Export").click()
-    choose(page, session._panels.export._kind, "shape (zip)")
+    choose(page, session._panels.export._kind, "shape (maps and mesh, zip)")
     wait_until(lambda: session._panels.export._images.disabled)
     press(page, "e")
     wait_for_text(page, "there is no shape yet; recover one in the tab Shape (key: N)")

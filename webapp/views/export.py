@@ -9,13 +9,13 @@ from photolin.export.maps import Convention
 from ..downloads import REPORT, SHAPE
 from ..values import choose_option
 
-RESULT = "result (zip)"
-SURFACE = "shape (zip)"
-PAGE = "report (web page)"
+RESULT = "result (npz and json, zip)"
+SURFACE = "shape (maps and mesh, zip)"
+PAGE = "report (one web page to send)"
 KINDS = {
-    "masks (PNG)": "masks",
-    "label maps (PNG)": "labels",
-    "linearized (TIFF)": "linearized",
+    "masks (PNG, zip)": "masks",
+    "label maps (indexed PNG, zip)": "labels",
+    "linearized (float32 TIFF)": "linearized",
     RESULT: "result",
     PAGE: REPORT,
     SURFACE: SHAPE,
