@@ -185,7 +185,7 @@ def _observe(
     pixels = choose_pixels(stack, seed, MOST_PIXELS)
     flat = stack.images.reshape(len(stack.images), -1)
     if source == "base images":
-        A = flat[np.ix_(analysis.base_images, pixels)]
+        A = np.stack([flat[base, pixels] for base in analysis.base_images])
     else:
         A = analysis.linearized_bases.reshape(3, -1)[:, pixels]
         known = np.isfinite(A).all(axis=0)
@@ -213,7 +213,7 @@ def _solve(
     with np.errstate(over="ignore", invalid="ignore"):
         v = inverses[:, :, 0] * y[:, :1] + inverses[:, :, 1] * y[:, 1:2]
         v += inverses[:, :, 2] * y[:, 2:]
-    v = v[np.isfinite(v).all(axis=1)]
+    v = v[np.isfinite(v).all(axis=1)].astype(np.float32)
     if len(v) == 0:
         raise DegenerateError(
             f"base images {base_images}: no three pixels give finite coefficients; choose others"

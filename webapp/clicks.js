@@ -53,7 +53,7 @@ window.openClicks = ({ fieldId }) => {
   function drag(event) {
     if (event.pointerId !== held?.pointerId) return;
     event.preventDefault();
-    const over = event.type !== "pointermove";
+    const over = event.type !== "pointermove" || event.buttons === 0; // let go outside the window
     if (!over && performance.now() - held.at < DRAG_MS) return;
     const limit = (share) => Math.min(Math.max(share, -1), 1).toFixed(4);
     const [x, y] = [event.clientX - held.x, event.clientY - held.y];

@@ -89,7 +89,6 @@ class Clicks:
         """`watch` without clicks."""
         return self.watch(name, _ignore, seen)
 
-
     def drag(self, name: str, dragged: Callable[[float, float], None]) -> str:
         """Call back while an element is dragged, up to 20 times a second.
 

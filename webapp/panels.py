@@ -14,6 +14,7 @@ from .canvas import Canvas
 from .clicks import Clicks
 from .frame import Frame
 from .state import Pixel, ViewState
+from .views.cloud import CloudView
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
@@ -93,6 +94,8 @@ class Panels:
             self.landscape = LandscapeView(gui, clicks, stack, self.thresholds.set, actions.tell)
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
+        with tabs.add_tab("Lights", viser.Icon.BULB):
+            self.cloud = CloudView(gui, clicks, stack, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
             self.compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
@@ -105,13 +108,14 @@ class Panels:
         self._readers = (self.run, *both, self.legend, self.compare, self.shape)
         self._drawers = (
             *(*both, self.samples, self.landscape, shares, summary),
-            *(self.diagnosis, self.compare, self.shape),
+            *(self.diagnosis, self.cloud, self.compare, self.shape),
         )
         self._keys = self._bind(actions)
 
     def close(self) -> None:
         """Stop what panels compute."""
         self.landscape.close()
+        self.cloud.close()
 
     def read(self, state: ViewState) -> ViewState:
         """The state with all that widgets stand for."""
