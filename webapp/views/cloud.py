@@ -34,10 +34,10 @@ TURN, TILT = 240.0, 180.0
 """Degrees that dragging across the whole width and height of the drawing turns it."""
 MOST_ZOOM = 50.0
 HELP = (
-    "Each dot: three pixels drawn at random and solved for this image's coefficients, those of the "
-    "base images in Eq. 2. Large dots agree with the winner. The line is the way of the centre of "
-    "gravity while the farthest are dropped, as the method statistical does. Percentages compare "
-    "linearized images where the image is lit (root mean square)."
+    "Drag the cube to turn it. Each dot: three pixels drawn at random and solved for this image's "
+    "coefficients, those of the base images in Eq. 2. Large dots agree with the winner. The line "
+    "is the way of the centre of gravity while the farthest are dropped, as the method statistical "
+    "does. Percentages compare linearized images where the image is lit (root mean square)."
 )
 
 
@@ -76,6 +76,8 @@ class CloudView(Watched):
         self._last: Cloud | None = None
         """The latest on screen."""
         self._job = Job(lambda work: work(), self._redraw)
+        # turning is drawn in a thread, for all tabs share the one that tells of it
+        self._pen, self._due = Job(lambda work: work(), self._draw_due), False
         self._source = gui.add_dropdown(
             "Solved from",
             SOURCES,
@@ -87,6 +89,8 @@ class CloudView(Watched):
             "Candidates", COUNTS, initial_value="2000", hint="Random samples of three pixels"
         )
         self._zoom = gui.add_slider("Zoom", 1, MOST_ZOOM, 0.5, 1.0, hint="Around the winner")
+        self._rest = (0.0, 0.0)
+        """Degrees that were dragged beyond what the sliders say."""
         self._drag_id = clicks.drag("cloud-cube", self._drag)
         self._html = gui.add_html(f'<div id="{self._id}"></div>')
         self._turn = gui.add_slider("Turn", -180, 180, 1, FIRST.azimuth, hint="Or drag the cube")
@@ -101,12 +105,16 @@ class CloudView(Watched):
     def close(self) -> None:
         """Stop, and draw nothing any more."""
         self._job.close()
+        self._pen.close()
 
     def _drag(self, right: float, down: float) -> None:
         """Turn the cube with the pointer, as if it were held."""
-        view = self._view()
-        self._turn.value = round((view.azimuth - TURN * right + 180) % 360 - 180)
-        self._tilt.value = round(min(max(view.elevation + TILT * down, -90), 90))
+        view, (turn, tilt) = self._view(), self._rest
+        azimuth = (view.azimuth + turn - TURN * right + 180) % 360 - 180
+        elevation = min(max(view.elevation + tilt + TILT * down, -90), 90)
+        # sliders hold whole degrees; a slow drag would else be rounded with each step
+        self._rest = azimuth - round(azimuth), elevation - round(elevation)
+        self._turn.value, self._tilt.value = round(azimuth), round(elevation)
 
     def _view(self) -> View:
         return View(
@@ -132,6 +140,16 @@ class CloudView(Watched):
         )
 
     def _redraw(self) -> None:
+        """Draw once more, soon; returns at once."""
+        self._due = True
+        self._draw_due()
+
+    def _draw_due(self) -> None:
+        if self._due:
+            self._pen.start(self._draw_again)  # refused while drawing; the end comes back here
+
+    def _draw_again(self) -> None:
+        self._due = False
         with self._lock:
             if self._shown and self._frame is not None:
                 self._show(self._frame)
@@ -143,8 +161,9 @@ class CloudView(Watched):
         if wanted is not None and found is None and frame.analysis is not None:
             # refused while another is drawn; that one's end comes back here
             self._job.start(partial(self._make, wanted, frame.analysis))
-        inner = self._draw_cloud(frame, found) + self._draw_lights(frame)
-        self._html.content = f'<div id="{self._id}" style="{INDENT};font-size:0.85em">{inner}</div>'
+        look = f'style="{INDENT};font-size:0.85em"'
+        self._html.content = f'<div id="{self._id}" {look}>{self._draw_cloud(frame, found)}</div>'
+        self._lights.content = f"<div {look}>{self._draw_lights(frame)}</div>"
 
     def _make(self, wanted: Wanted, analysis: Analysis) -> None:
         began = monotonic()
