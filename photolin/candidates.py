@@ -1,8 +1,7 @@
 """The cloud of coefficient candidates of one image, its winner and its centre of gravity (Fig. 3).
 
-Step 1 picks one of many candidates, each solved from three pixels (Eq. 2). The published method
-takes the one with the most support (Eq. 5), its predecessor the centre of gravity of what is left
-when the farthest are dropped. Here both are seen on the same candidates.
+Each candidate is solved from three pixels (Eq. 2). The published method takes the one with the most
+support (Eq. 5), its predecessor the centre of gravity of what is left when the farthest go.
 """
 
 from dataclasses import dataclass
@@ -84,8 +83,7 @@ class Cloud:
         Root mean square over the lit pixels, relative to that of the winner's image; 0 for the
         winner itself, infinite where the winner's image is black.
         """
-        away = np.asarray(coefficients, np.float64) - self.best
-        return _measure(away, self.gram, self.best)
+        return _measure(coefficients, self.best, self.gram)
 
 
 class _Drawn(NamedTuple):
@@ -145,7 +143,6 @@ def draw_candidates(
     # einsum: the last digits of a product by BLAS depend on its threads
     gram = np.einsum("im,jm->ij", A, A) / A.shape[1]
     path, left = _follow_centre(candidates)
-    best = candidates[winner]
     return Cloud(
         image=image,
         source=source,
@@ -153,7 +150,7 @@ def draw_candidates(
         candidates=candidates,
         support=support,
         winner=winner,
-        inliers=_measure(candidates - best.astype(np.float64), gram, best) <= thresholds.T,
+        inliers=_measure(candidates, candidates[winner], gram) <= thresholds.T,
         path=path,
         left=left,
         pixels=len(drawn.x),
@@ -236,21 +233,21 @@ def _count(
     return (diffuse if source == "base images" else score) + np.int32(dark)
 
 
-def _follow_centre(
-    candidates: NDArray[np.float32],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _follow_centre(v: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """(S,3) centres of gravity and (S,) of how many candidates each is."""
-    n = len(candidates)
+    n = len(v)
     path, left = np.empty((n, 3)), np.empty(n, np.int64)
-    steps = centre_path(candidates.astype(np.float64), ceil(KEEP * n), path, left)
+    steps = centre_path(v.astype(np.float64), ceil(KEEP * n), path, left)
     return path[:steps].copy(), left[:steps].copy()
 
 
 def _measure(
-    away: NDArray[np.float64], gram: NDArray[np.float64], best: NDArray[np.floating]
+    coefficients: ArrayLike, best: NDArray[np.float32], gram: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Root mean square of the images of coefficients (...,3), relative to that of `best`'s."""
-    square, whole = (np.einsum("...i,ij,...j", v, gram, v) for v in (away, best.astype(float)))
+    """`Cloud.distances` of coefficients (...,3) from `best`."""
+    whole = best.astype(np.float64)
+    away = np.asarray(coefficients, np.float64) - whole
+    squares = [np.einsum("...i,ij,...j", v, gram, v) for v in (away, whole)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.sqrt(np.maximum(square, 0) / whole)
-    return np.where(square > 0, relative, 0.0)
+        relative = np.sqrt(np.maximum(squares[0], 0) / squares[1])
+    return np.where(squares[0] > 0, relative, 0.0)

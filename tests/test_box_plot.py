@@ -98,6 +98,19 @@ def test_numbers_stand_where_their_values_are() -> None:
         assert one.place([0, 0, float(text)])[1] == pytest.approx(y, abs=0.1)
 
 
+@pytest.mark.parametrize("view", [View(35, 25), View(-120, -40), View(170, 10)])
+def test_walls_are_behind(view: View) -> None:
+    one = box(view)
+    svg = ElementTree.fromstring(draw_box(one, NAMES, "", "title"))
+    walls = next(svg.iter(f"{SVG}path")).get("d", "")
+    ends = np.array([end.split() for end in walls.replace("L", "M").split("M")[1:]], float)
+    corners = CENTRE + 0.5 * np.array(list(product((-1, 1), repeat=3)))
+    depth = corners @ view.rotation[2]
+    near, far = (one.place(corners[n(depth)]) for n in (np.argmax, np.argmin))
+    assert np.abs(ends - far).max(axis=1).min() < 0.1
+    assert np.abs(ends - near).max(axis=1).min() > 1
+
+
 def test_text_from_outside_is_escaped() -> None:
     drawn = draw_box(box(View(35, 25)), ("<b>", "&", '"'), "", '"><script>')
     assert "<script" not in drawn

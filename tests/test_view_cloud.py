@@ -17,6 +17,7 @@ from photolin.errors import Cancelled, DegenerateError
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import Frame, compose
+from webapp.lights_plot import format_vector
 from webapp.state import ViewState
 from webapp.views import cloud as module
 from webapp.views.cloud import CloudView
@@ -173,6 +174,29 @@ def test_stepping_back_draws_nothing_again_and_T_counts_support_anew(seen: Seen)
         (OTHER, 0.05),
         (ONE, 0.1),
     ]
+
+
+def test_another_result_draws_anew_only_where_it_is_what_is_solved(seen: Seen) -> None:
+    seen.release.set()
+    seen.clicks.seen(True)
+    other = replace(RESULT, coefficients=RESULT.coefficients * 1.5)
+    for analysis in (RESULT, other):
+        seen.view.draw(frame(analysis=analysis))
+        seen.wait_for(f"Result: c = {format_vector(analysis.coefficients[ONE])}")
+    assert len(seen.began) == 1
+    seen.view._source.value = "linearized bases"
+    seen.wait_for("D + A + C - U")
+    seen.view.draw(frame())
+    wait_until(lambda: len(seen.began) == 3)
+
+
+def test_drawing_comes_to_rest(seen: Seen) -> None:
+    seen.release.set()
+    seen.clicks.seen(True)
+    seen.view.draw(frame())
+    seen.wait_for(f"Image {ONE}: ")
+    seen.view._turn.value = 70
+    wait_until(lambda: not any(thread.name == "job" for thread in threading.enumerate()))
 
 
 def test_while_one_is_drawn_the_last_is_faint_and_only_the_newest_follows(seen: Seen) -> None:

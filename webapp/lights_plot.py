@@ -80,6 +80,23 @@ def plot_lights(lights: NDArray[np.float64], current: int, names: Sequence[str])
     )
 
 
+def describe_coefficients(count: int, current: int) -> str:
+    """What `plot_coefficients` shows, and what to do for more."""
+    return (
+        f"Coefficients of all {count} images; image {current} is ringed. Recover the shape (tab "
+        "Shape) to see the directions of the lights."
+    )
+
+
+def describe_lights(count: int, current: int, *, recovered: bool) -> str:
+    """What `plot_lights` shows: lights that were recovered with a shape, or given ones."""
+    by = "as recovered" if recovered else "as given"
+    return (
+        f"Lights of all {count} images {by}, seen from the camera; rim: from the side. Image "
+        f"{current} is ringed; hollow: from behind."
+    )
+
+
 def format_vector(vector: ArrayLike) -> str:
     """Three coefficients with three decimals, in parentheses."""
     return f"({', '.join(f'{value:z.3f}' for value in np.asarray(vector, float).tolist())})"

@@ -18,7 +18,12 @@ from ..clicks import Clicks
 from ..cloud_plot import describe_cloud, plot_cloud, plot_legend
 from ..frame import Frame
 from ..job import Job
-from ..lights_plot import plot_coefficients, plot_lights
+from ..lights_plot import (
+    describe_coefficients,
+    describe_lights,
+    plot_coefficients,
+    plot_lights,
+)
 from ..readout import escape
 from ..values import choose_option, clamp_number
 from . import INDENT
@@ -64,11 +69,7 @@ class CloudView(Watched):
         stack: ImageStack,
         tell: Callable[[Exception], None],
     ) -> None:
-        """Build the widgets.
-
-        Args:
-            tell: called with what went wrong by a fault of the program.
-        """
+        """Build the widgets; `tell` is called with what went wrong by a fault of the program."""
         super().__init__(clicks, "cloud")
         self._stack, self._tell = stack, tell
         self._clouds: dict[Wanted, Cloud | str] = {}
@@ -78,6 +79,12 @@ class CloudView(Watched):
         self._job = Job(lambda work: work(), self._redraw)
         # turning is drawn in a thread, for all tabs share the one that tells of it
         self._pen, self._due = Job(lambda work: work(), self._draw_due), False
+        self._rest = (0.0, 0.0)
+        """Degrees that were dragged beyond what the sliders say."""
+        self._drag_id = clicks.drag("cloud-cube", self._drag)
+        self._build(gui)
+
+    def _build(self, gui: viser.GuiApi) -> None:
         self._source = gui.add_dropdown(
             "Solved from",
             SOURCES,
@@ -89,9 +96,6 @@ class CloudView(Watched):
             "Candidates", COUNTS, initial_value="2000", hint="Random samples of three pixels"
         )
         self._zoom = gui.add_slider("Zoom", 1, MOST_ZOOM, 0.5, 1.0, hint="Around the winner")
-        self._rest = (0.0, 0.0)
-        """Degrees that were dragged beyond what the sliders say."""
-        self._drag_id = clicks.drag("cloud-cube", self._drag)
         self._html = gui.add_html(f'<div id="{self._id}"></div>')
         self._turn = gui.add_slider("Turn", -180, 180, 1, FIRST.azimuth, hint="Or drag the cube")
         self._tilt = gui.add_slider("Tilt", -90, 90, 1, FIRST.elevation, hint="Or drag the cube")
@@ -228,19 +232,10 @@ class CloudView(Watched):
         shape = frame.shape
         lights = analysis.lights if shape is None else shape.lights
         if lights is None:
-            told = (
-                f"Coefficients of all {len(names)} images; image {image} is ringed. Recover the "
-                "shape (tab Shape) to see the directions of the lights."
-            )
             plot = plot_coefficients(analysis.coefficients, image, names, self._view())
-        else:
-            by = "as given" if shape is None else "as recovered"
-            told = (
-                f"Lights of all {len(names)} images {by}, seen from the camera; rim: from the "
-                f"side. Image {image} is ringed; hollow: from behind."
-            )
-            plot = plot_lights(lights, image, names)
-        return _paragraph(told) + plot
+            return _paragraph(describe_coefficients(len(names), image)) + plot
+        told = describe_lights(len(names), image, recovered=shape is not None)
+        return _paragraph(told) + plot_lights(lights, image, names)
 
 
 def _paragraph(text: str) -> str:
