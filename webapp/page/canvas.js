@@ -143,6 +143,7 @@ window.openCanvas = (options) => {
     setMarks: marks.setMarks,
     setLight: light.setLight,
     setReadout: marks.setReadout,
+    copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };
 };
