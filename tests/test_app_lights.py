@@ -11,6 +11,7 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.session import Session
+from webapp.source import Source
 
 pytestmark = [
     pytest.mark.browser,
@@ -24,7 +25,7 @@ RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
 
 @pytest.fixture
 def app() -> Iterator[App]:
-    opened = App(STACK, RESULT, options=RESULT.options, port=0)
+    opened = App(Source(STACK, RESULT, RESULT.options), port=0)
     yield opened
     opened.stop()
 
@@ -60,7 +61,7 @@ def test_a_drag_turns_the_cube_and_leaves_the_picture_alone(page: Any, app: App)
     wait_until(lambda: abs(view._tilt.value - (start[1] + 36)) <= 1)
     wait_until(lambda: view._html.content != before)
     assert page.evaluate("JSON.stringify(window.photolin.similarity())") == place
-    assert session._pixel is None
+    assert session._pointing.pixel is None
 
 
 def test_the_cloud_follows_the_image_and_what_it_is_solved_from(page: Any, app: App) -> None:

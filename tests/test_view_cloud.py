@@ -18,6 +18,7 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import Frame, compose
 from webapp.lights_plot import format_vector
+from webapp.runs import Runs
 from webapp.state import ViewState
 from webapp.views import cloud as module
 from webapp.views.cloud import CloudView
@@ -94,7 +95,7 @@ class Seen:
     def __post_init__(self) -> None:
         gui, self.clicks = FakeGui(), FakeClicks()
         given: tuple[Any, Any] = (gui, self.clicks)
-        self.view = CloudView(*given, STACK, self.told.append)
+        self.view = CloudView(*given, self.told.append)
 
     def make(self, stack: Any, analysis: Any, image: int, *, cancel: Any, **asked: Any) -> Any:
         self.began.append((image, asked["source"], asked["count"], asked["thresholds"].T))
@@ -138,7 +139,7 @@ def frame(image: int = ONE, analysis: Analysis | None = RESULT, T: float = 0.05)
     results: dict[Method, Analysis] = {}
     if analysis is not None:
         results[analysis.options.method] = analysis
-    return compose(STACK, results, ViewState(image=image, T=T, Ts=0.02))
+    return compose(Runs(STACK, Options()), results, ViewState(image=image, T=T, Ts=0.02))
 
 
 def test_a_cloud_is_drawn_once_when_its_place_comes_into_view(seen: Seen) -> None:
@@ -188,6 +189,25 @@ def test_another_result_draws_anew_only_where_it_is_what_is_solved(seen: Seen) -
     seen.wait_for("D + A + C - U")
     seen.view.draw(frame())
     wait_until(lambda: len(seen.began) == 3)
+
+
+def test_a_stack_with_fewer_images_gets_a_cloud_of_its_own(seen: Seen) -> None:
+    seen.release.set()
+    seen.clicks.seen(True)
+    seen.view.draw(frame(7))
+    seen.wait_for("Image 7")
+    few = replace(STACK, images=STACK.images[:7], names=STACK.names[:7], lights=None)
+    shown = replace(RESULT, coefficients=RESULT.coefficients[:7], labels=RESULT.labels[:7])
+    seen.release.clear()
+    seen.view.draw(replace(frame(ONE, analysis=shown), stack=few))
+    assert f"Candidates for image {ONE} are being drawn." in seen.html
+    assert "<svg" not in seen.html
+    seen.release.set()
+    seen.wait_for(f"Image {ONE}")
+    assert "Coefficients of all 7 images" in seen.lights
+    seen.view.draw(frame(ONE))  # the same number, yet another stack
+    seen.wait_for("2000 candidates")
+    wait_until(lambda: seen.images == [7, ONE, ONE])
 
 
 def test_drawing_comes_to_rest(seen: Seen) -> None:

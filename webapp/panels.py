@@ -105,7 +105,7 @@ class Panels:
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
         with tabs.add_tab("Lights", viser.Icon.BULB):
-            self.cloud = CloudView(gui, clicks, stack, actions.tell)
+            self.cloud = CloudView(gui, clicks, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
             self.compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):

@@ -49,6 +49,7 @@ HELP = (
 class Wanted(NamedTuple):
     """What decides a cloud."""
 
+    stack: ImageStack
     analysis: Analysis | None
     """Whose linearized bases are solved; None where the base images are."""
     base_images: tuple[int, int, int]
@@ -66,16 +67,15 @@ class CloudView(Watched):
         self,
         gui: viser.GuiApi,
         clicks: Clicks,
-        stack: ImageStack,
         tell: Callable[[Exception], None],
     ) -> None:
         """Build the widgets; `tell` is called with what went wrong by a fault of the program."""
         super().__init__(clicks, "cloud")
-        self._stack, self._tell = stack, tell
+        self._tell = tell
         self._clouds: dict[Wanted, Cloud | str] = {}
         """Or why there is none; the latest last."""
-        self._last: Cloud | None = None
-        """The latest on screen."""
+        self._last: tuple[ImageStack, Cloud] | None = None
+        """The latest on screen, and of what."""
         self._job = Job(lambda work: work(), self._redraw)
         # turning is drawn in a thread, for all tabs share the one that tells of it
         self._pen, self._due = Job(lambda work: work(), self._draw_due), False
@@ -134,6 +134,7 @@ class CloudView(Watched):
         count = int(choose_option(self._count.value, COUNTS, COUNTS[1]))
         analysis, state = frame.analysis, frame.state
         return Wanted(
+            frame.stack,
             analysis if source == "linearized bases" else None,
             analysis.base_images,
             state.image,
@@ -180,7 +181,7 @@ class CloudView(Watched):
         made: Cloud | str
         try:
             made = draw_candidates(
-                self._stack,
+                wanted.stack,
                 analysis,
                 wanted.image,
                 source=wanted.source,
@@ -206,10 +207,11 @@ class CloudView(Watched):
         if isinstance(found, str):
             return _paragraph(found)
         image = frame.state.image
-        if found is None and self._last is None:
+        if found is not None:
+            self._last = frame.stack, found
+        if self._last is None or self._last[0] is not frame.stack:
             return _paragraph(f"Candidates for image {image} are being drawn.")
-        cloud = self._last = found or self._last
-        assert cloud is not None
+        cloud = self._last[1]
         coefficients = frame.analysis.coefficients[cloud.image]
         zoom = clamp_number(self._zoom.value, 1, MOST_ZOOM, 1)
         drawing, outside = plot_cloud(cloud, coefficients, self._view(), zoom)
@@ -226,7 +228,7 @@ class CloudView(Watched):
         )
 
     def _draw_lights(self, frame: Frame) -> str:
-        analysis, image, names = frame.analysis, frame.state.image, self._stack.names
+        analysis, image, names = frame.analysis, frame.state.image, frame.stack.names
         if analysis is None:
             return ""
         shape = frame.shape
