@@ -81,7 +81,8 @@ class Panels:
             known: whether frames come with the truth.
             state: whose method and thresholds are set at first.
         """
-        gui, changed, clicks = client.gui, actions.changed, Clicks(client)
+        gui, changed = client.gui, actions.changed
+        self.clicks = clicks = Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
