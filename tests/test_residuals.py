@@ -35,7 +35,7 @@ def test_the_share_that_passes_is_counted_and_grows_with_T() -> None:
 
 def test_T_is_about_the_suggested_one_and_follows_the_noise() -> None:
     found = measure_residuals(SCENE.stack, RESULT, RESULT.thresholds.Ts)
-    assert found.T == pytest.approx(RESULT.thresholds.T, rel=0.2)
+    assert pytest.approx(RESULT.thresholds.T, rel=0.2) == found.T
     quiet = render_scene("sphere_cone", size=(60, 80), images=10, noise=0.004, bits=16)
     less = measure_residuals(quiet.stack, analyze(quiet.stack), RESULT.thresholds.Ts)
     assert less.T < 0.8 * found.T

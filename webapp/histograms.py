@@ -5,29 +5,32 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.analysis import Analysis
 from photolin.export.html_plots import ticks
-from photolin.factors import Factor, Thresholds, css_colour
-from photolin.stack import ImageStack
+from photolin.factors import Factor, css_colour
 
 from .readout import escape
 
 WIDTH, HEIGHT = 300, 110
 LEFT, TOP, BOTTOM = 8, 8, 30
 BINS = 48
-RESIDUALS = 200_000
-"""Observations, about, that the histogram of residuals is of."""
+SHADOW, LIT = Factor.CAST, Factor.DIFFUSE
+"""Classes in whose colours the samples of both kinds are drawn."""
 
 
 def plot_histogram(
-    kinds: Sequence[tuple[NDArray[np.floating], str]], top: float, line: float, axis: str
+    kinds: Sequence[tuple[NDArray[np.floating], str]],
+    top: float,
+    proposed: float,
+    present: float,
+    axis: str,
 ) -> str:
-    """Samples of one or two kinds in bins from 0 to `top`, and a line.
+    """Samples of one or two kinds in bins from 0 to `top`, and a level that they stand for.
 
     Args:
         kinds: values and CSS colour of each; each kind is scaled to its own fullest bin.
         top: right end of the axis, above 0; values beyond it are left out.
-        line: where the line is.
+        proposed: the level, a line.
+        present: the level that is set, a dashed line.
         axis: name of the axis, with its unit.
     """
     wide, high = WIDTH - 2 * LEFT, HEIGHT - TOP - BOTTOM
@@ -43,12 +46,13 @@ def plot_histogram(
                     f'y="{TOP + (1 - share) * high:.2f}" height="{share * high:.2f}" '
                     f'fill="{colour}" fill-opacity="0.6"/>'
                 )
-    if 0 <= line <= top:
-        x = LEFT + line / top * wide
-        parts.append(
-            f'<line x1="{x:.2f}" x2="{x:.2f}" y1="{TOP}" y2="{TOP + high}" stroke="currentColor" '
-            'stroke-width="1.5" stroke-dasharray="4 3"/>'
-        )
+    for level, dash in ((present, ' stroke-dasharray="4 3"'), (proposed, "")):
+        if 0 <= level <= top:
+            x = LEFT + level / top * wide
+            parts.append(
+                f'<line x1="{x:.2f}" x2="{x:.2f}" y1="{TOP}" y2="{TOP + high}" '
+                f'stroke="currentColor" stroke-width="1.5"{dash}/>'
+            )
     parts.append(
         f'<line x1="{LEFT}" x2="{LEFT + wide}" y1="{TOP + high}" y2="{TOP + high}" '
         'stroke="currentColor" stroke-opacity="0.5"/>'
@@ -68,40 +72,21 @@ def plot_histogram(
     )
 
 
-def residuals_below(
-    stack: ImageStack, analysis: Analysis, Ts: float, most: int = RESIDUALS
-) -> NDArray[np.float32]:
-    """(l - i)/i of lit observations darker than the fit, where no highlight can be: the noise.
-
-    Args:
-        most: about as many observations are looked at.
-    """
-    pixels = np.flatnonzero(analysis.determined())
-    pixels = pixels[:: max(1, len(pixels) * len(stack.images) // most)]
-    i = stack.images.reshape(len(stack.images), -1)[:, pixels]
-    bases = analysis.linearized_bases.reshape(3, -1)[:, pixels]
-    l = analysis.coefficients.astype(np.float32) @ bases
-    below = (i >= max(Ts, 1e-9)) & (l > i)
-    return (l[below] - i[below]) / i[below]
-
-
-def plot_residuals(values: NDArray[np.float32], thresholds: Thresholds) -> str:
-    """The residuals below the fit with T."""
-    top = 2.5 * thresholds.T
+def plot_residuals(values: NDArray[np.float32], proposed: float, present: float) -> str:
+    """The residuals below the fit, with a proposed T and the one that is set."""
+    top = 2.5 * max(proposed, present)
     if values.size:
         top = max(top, min(float(np.quantile(values, 0.99)), 0.5))
-    return plot_histogram(
-        [(values, css_colour(Factor.DIFFUSE))],
-        top,
-        thresholds.T,
-        "(l - i)/i below the fit; line: T",
-    )
+    kinds = [(values, css_colour(Factor.DIFFUSE))]
+    return plot_histogram(kinds, top, proposed, present, "(l - i)/i below the fit")
 
 
-def plot_samples(shadows: NDArray[np.float32], lit: NDArray[np.float32], Ts: float) -> str:
-    """Sampled intensities of shadows and of lit pixels with a Ts."""
-    top = max(2.5 * Ts, float(shadows.max(initial=0)) * 1.2, 1e-4)
+def plot_samples(
+    shadows: NDArray[np.float32], lit: NDArray[np.float32], proposed: float, present: float
+) -> str:
+    """Sampled intensities of shadows and of lit pixels, with a proposed Ts and the one set."""
+    top = max(2.5 * proposed, 1.2 * present, float(shadows.max(initial=0)) * 1.2, 1e-4)
     if lit.size:
         top = max(top, min(float(np.quantile(lit, 0.3)) * 1.2, 10 * top))
-    kinds = [(shadows, css_colour(Factor.CAST)), (lit, css_colour(Factor.DIFFUSE))]
-    return plot_histogram(kinds, top, Ts, "intensity (fraction of full scale); line: Ts")
+    kinds = [(shadows, css_colour(SHADOW)), (lit, css_colour(LIT))]
+    return plot_histogram(kinds, top, proposed, present, "intensity (fraction of full scale)")

@@ -97,7 +97,6 @@ class Session:
             stop=self._work.stop,
             download=self._work.download,
             recover=self._recover,
-            resample=self._resample,
             pin=self._pin,
             unpin=self._unpin,
             tell=self._tell,
@@ -161,11 +160,6 @@ class Session:
         if not self._panels.take(pixel):
             self._pixel = pixel
             self._wake.set()
-
-    def _resample(self) -> None:
-        if self._frame is not None:
-            self._panels.samples.draw(self._frame)
-        self._wake.set()
 
     def _pin(self) -> None:
         """Pin the selected pixel, or take its pin away; the oldest of too many goes."""
@@ -235,6 +229,7 @@ class Session:
             self._panels.draw(frame)
         else:
             rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
+            self._panels.redraw()
         return self._catch_up.pursue(state, results.get(state.method), rested) or rough or moving
 
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
