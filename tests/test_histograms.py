@@ -73,3 +73,17 @@ def test_sampled_shadows_and_lit_pixels_have_the_colours_of_their_classes() -> N
     assert dark[0] < min(x for x, _ in bright)
     assert dark[0] < (line_at(html) or 0) < min(x for x, _ in bright) + 10
     assert (line_at(html, dashed=True) or 0) > (line_at(html) or 0)
+
+
+def test_values_beyond_the_axis_are_told_as_a_share_of_their_kind() -> None:
+    few, many = np.array([0.1] * 98 + [2.0] * 2), np.array([0.1, 2.0, 3.0, 4.0])
+    texts = [
+        "".join(text.itertext())
+        for text in ET.fromstring(
+            plot_histogram([(few, "red"), (many, "green")], 1.0, 0.2, 0.3, "x")
+        ).iter(f"{SVG}text")
+    ]
+    assert [text.split(" ")[0] for text in texts if "beyond" in text] == ["2%", "75%"]
+    hardly = np.array([0.1] * 299 + [2.0])
+    html = plot_histogram([(hardly, "red")], 1.0, 0.2, 0.3, "x")
+    assert "beyond" not in html

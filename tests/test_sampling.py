@@ -1,15 +1,24 @@
 """Pointed-out pixels: all of the mask in the box, each kind for itself, bounded in number."""
 
 from dataclasses import replace
+from html import unescape
 
 import numpy as np
 import pytest
 
+from photolin.shadow_level import ShadowLevel
 from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp import sampling
 from webapp.box import Box
-from webapp.sampling import Sample, pool_samples, take_sample
+from webapp.sampling import (
+    COLOURS,
+    Sample,
+    pool_samples,
+    take_sample,
+    tell_level,
+    tell_sampling,
+)
 
 STACK = render_scene("sphere_cone", size=(24, 32), images=6).stack
 
@@ -69,3 +78,29 @@ def test_large_boxes_are_counted_whole_and_thinned_evenly(monkeypatch: pytest.Mo
     spread = np.quantile(everything, [0.2, 0.5, 0.8])
     np.testing.assert_allclose(np.quantile(found.values, [0.2, 0.5, 0.8]), spread, atol=0.05)
     assert pool_samples([found] * 9, "lit").size == 1200
+
+
+def test_the_counts_of_each_kind_are_told_and_what_a_drag_does() -> None:
+    boxes = (
+        ("shadow", 0, Box(0, 2, 0, 3)),
+        ("lit", 1, Box(4, 6, 5, 6)),
+        ("lit", 1, Box(7, 8, 0, 2)),
+    )
+    samples = tuple(taken(*box) for box in boxes)
+    html = "".join(tell_sampling("lit", samples, "a < b"))
+    told = unescape(html)
+    assert "Shadows: 6 pixels in 1 sample<" in told
+    assert "Lit pixels: 4 pixels in 2 samples<" in told
+    assert f"border-left:4px solid {COLOURS['lit']}" in told
+    assert "a < b" in told
+    assert "a < b" not in html
+    nothing = unescape("".join(tell_sampling(None, (), "")))
+    assert "Not sampling" in nothing
+    assert "Shadows: none" in nothing
+
+
+def test_the_level_found_is_told_beside_the_one_that_is_set() -> None:
+    told = unescape(tell_level(ShadowLevel(0.0312, 0.025), 0.02))
+    assert "Ts 0.0312 (line): 2.5% of the samples" in told
+    told = unescape(tell_level(ShadowLevel(7.6e-6, 0.0), 0.02))
+    assert "Ts 7.6e-06 (line): no sample on the wrong side. Now 0.0200 (dashed)." in told

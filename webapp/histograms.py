@@ -13,6 +13,8 @@ from .readout import escape
 WIDTH, HEIGHT = 300, 110
 LEFT, TOP, BOTTOM = 8, 8, 30
 BINS = 48
+BEYOND = 0.01
+"""Share of values beyond the axis from which it is told."""
 SHADOW, LIT = Factor.CAST, Factor.DIFFUSE
 """Classes in whose colours the samples of both kinds are drawn."""
 
@@ -28,14 +30,15 @@ def plot_histogram(
 
     Args:
         kinds: values and CSS colour of each; each kind is scaled to its own fullest bin.
-        top: right end of the axis, above 0; values beyond it are left out.
+        top: right end of the axis, above 0; the share of values beyond it is told.
         proposed: the level, a line.
         present: the level that is set, a dashed line.
         axis: name of the axis, with its unit.
     """
     wide, high = WIDTH - 2 * LEFT, HEIGHT - TOP - BOTTOM
     parts = []
-    for values, colour in kinds:
+    for order, (values, colour) in enumerate(kinds):
+        parts.append(_tell_beyond(values, colour, top, TOP + 10 + 14 * order))
         counts, _ = np.histogram(values, BINS, (0, top))
         if not counts.any():
             continue
@@ -58,9 +61,11 @@ def plot_histogram(
         'stroke="currentColor" stroke-opacity="0.5"/>'
     )
     for value in ticks(0, top):
+        x = LEFT + value / top * wide
+        anchor = "end" if x > WIDTH - 2 * LEFT else "middle"
         parts.append(
-            f'<text x="{LEFT + value / top * wide:.2f}" y="{TOP + high + 12}" '
-            f'text-anchor="middle">{value:g}</text>'
+            f'<text x="{min(x, WIDTH - 2):.2f}" y="{TOP + high + 12}" text-anchor="{anchor}">'
+            f"{value:g}</text>"
         )
     parts.append(
         f'<text x="{WIDTH / 2:g}" y="{HEIGHT - 4}" text-anchor="middle">{escape(axis)}</text>'
@@ -69,6 +74,17 @@ def plot_histogram(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="100%" '
         'role="img" fill="currentColor" font-family="system-ui,sans-serif" font-size="10">'
         f"{''.join(parts)}</svg>"
+    )
+
+
+def _tell_beyond(values: NDArray[np.floating], colour: str, top: float, y: float) -> str:
+    """The share of values that lie beyond the axis, at its right end; nothing for hardly any."""
+    beyond = float((values > top).mean()) if values.size else 0.0
+    if beyond < BEYOND:
+        return ""
+    return (
+        f'<text x="{WIDTH - LEFT}" y="{y:g}" text-anchor="end">{beyond:.0%} beyond '
+        f'\N{RIGHTWARDS ARROW}<tspan fill="{colour}"> \N{BLACK SQUARE}</tspan></text>'
     )
 
 

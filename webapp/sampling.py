@@ -86,7 +86,7 @@ def tell_sampling(picking: Kind | None, samples: tuple[Sample, ...], note: str) 
 
 def tell_level(level: ShadowLevel, now: float) -> str:
     """The Ts found beside the one that is set; HTML."""
-    found, error = tell_threshold(level.Ts), f"{level.error:.1%} of the samples on the wrong side"
-    return (
-        f"<div>{escape(f'Ts {found} (line): {error}. Now {tell_threshold(now)} (dashed).')}</div>"
-    )
+    wrong = f"{level.error:.1%} of the samples" if level.error else "no sample"
+    found, present = tell_threshold(level.Ts), tell_threshold(now)
+    text = f"Ts {found} (line): {wrong} on the wrong side. Now {present} (dashed)."
+    return f"<div>{escape(text)}</div>"

@@ -70,10 +70,7 @@ class SamplesView(Watched):
         self._level: ShadowLevel | None = None
         self._residuals: tuple[Analysis, float, Residuals] | None = None
         super().__init__(clicks, "samples")
-        gui.add_markdown(
-            "Point out **shadows** in some images, and **lit** pixels if you like: Ts is put "
-            "close above the shadows."
-        )
+        gui.add_markdown("**Ts** from pixels in **shadow**; **lit** ones help.")
         self._kinds = {kind: self._add_kind(gui, kind) for kind in NAMES}
         self._side = gui.add_dropdown(
             "A click takes", tuple(SIDES), initial_value="5 x 5", hint="Pixels around the click"
@@ -83,18 +80,18 @@ class SamplesView(Watched):
         )
         self._told = gui.add_html("")
         self._set_Ts = gui.add_button(
-            "Set Ts", disabled=True, hint="Move the slider Ts to the level found; Z undoes it"
+            "Set Ts",
+            disabled=True,
+            hint="Move the slider Ts to the level found, close above the shadows; Z undoes it",
         )
-        gui.add_markdown(
-            "What is darker than the fit can only be noise. T is best at about 1.4 standard "
-            "deviations of it: a larger T takes highlights for diffuse."
-        )
+        gui.add_markdown("**T** from the noise: what is darker than the fit.")
         self._plot = gui.add_html(f'<div id="{self._id}"></div>')
         self._set_T = gui.add_button(
             "Set T",
             disabled=True,
-            hint="Move the slider T to the level found, as the key S does for T and Ts; Z undoes "
-            "it. Passed: share of the observations below the fit that would be diffuse",
+            hint="Move the slider T to the level found, about 1.4 standard deviations of the "
+            "noise: a larger T takes highlights for diffuse. Passed: share of the observations below the "
+            "fit that T takes for diffuse. Key S sets T and Ts from the data; Z undoes it",
         )
         self._listen(set_T, set_Ts)
 
@@ -207,7 +204,9 @@ class SamplesView(Watched):
         told = [*tell_sampling(self._picking, samples, self._note)]
         if level is not None:
             told += [plot_samples(shadows, lit, level.Ts, now.Ts), tell_level(level, now.Ts)]
-        self._told.content = f'<div style="{INDENT};font-size:0.8em">{"".join(told)}</div>'
+        self._told.content = (
+            f'<div style="{INDENT};padding-bottom:0.3em;font-size:0.8em">{"".join(told)}</div>'
+        )
         self._stop.disabled = self._picking is None
         self._set_Ts.disabled = level is None
         self._set_Ts.label = "Set Ts" if level is None else f"Set Ts to {tell_threshold(level.Ts)}"
