@@ -90,8 +90,8 @@ class SamplesView(Watched):
             "Set T",
             disabled=True,
             hint="Move the slider T to the level found, about 1.4 standard deviations of the "
-            "noise: a larger T takes highlights for diffuse. Passed: share of the observations below the "
-            "fit that T takes for diffuse. Key S sets T and Ts from the data; Z undoes it",
+            "noise: a larger T takes highlights for diffuse. Passed: share of the observations "
+            "below the fit that T takes for diffuse. S sets T and Ts from the data; Z undoes it",
         )
         self._listen(set_T, set_Ts)
 
