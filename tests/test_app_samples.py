@@ -24,6 +24,7 @@ from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.box import Box
 from webapp.session import Session
+from webapp.source import Source
 
 pytestmark = [
     pytest.mark.browser,
@@ -38,7 +39,7 @@ RESULT = analyze(STACK, Options(T=0.05, Ts=0.05, samples=50))
 
 @pytest.fixture
 def app() -> Iterator[App]:
-    opened = App(STACK, RESULT, options=RESULT.options, port=0)
+    opened = App(Source(STACK, RESULT, RESULT.options), port=0)
     yield opened
     opened.stop()
 
@@ -125,7 +126,7 @@ def test_a_rectangle_on_a_shadow_sets_Ts_between_true_shadows_and_true_light(
     wait_until(lambda: session._read().thresholds == first)
     press(page, "Shift+Z")
     wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    assert session._pixel is None  # these clicks select nothing
+    assert session._pointing.pixel is None  # these clicks select nothing
 
 
 def test_samples_are_undone_and_cleared_kind_by_kind(page: Any, app: App) -> None:
@@ -182,7 +183,7 @@ def test_a_drag_pans_and_a_click_selects_unless_samples_are_taken_in_view(
     wait_for_cursor(page, "")
     pan()
     click_pixel(page, 20, 20)
-    wait_until(lambda: session._pixel == (20, 20))
+    wait_until(lambda: session._pointing.pixel == (20, 20))
     assert len(session._panels.samples._samples) == 1
 
 

@@ -13,7 +13,7 @@ from photolin.pipeline import analyze
 from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp.box import Box
-from webapp.frame import compose
+from webapp.frame import Frame
 from webapp.state import ViewState
 from webapp.views import samples as module
 from webapp.views.samples import CLEAR, START, UNDO, SamplesView
@@ -60,7 +60,7 @@ class Tab:
     def __post_init__(self) -> None:
         clicks = SimpleNamespace(see=lambda name, seen: name)
         canvas = SimpleNamespace(set_sampling=self.sampling.append, set_boxes=self.boxes.append)
-        given: tuple[Any, ...] = (FakeGui(), clicks, canvas, self.stack)
+        given: tuple[Any, ...] = (FakeGui(), clicks, canvas)
         self.view = SamplesView(*given, self.change, lambda _: None, lambda _: None)
         self.show(0)
         self.view._see(True)
@@ -69,9 +69,9 @@ class Tab:
     def change(self) -> None:
         self.changed += 1
 
-    def show(self, image: int) -> None:
+    def show(self, image: int, excluded: tuple[int, ...] = ()) -> None:
         state = ViewState(image=image, T=0.05, Ts=0.03)
-        self.view.draw(compose(self.stack, {"robust": RESULT}, state))
+        self.view.draw(Frame(self.stack, state, RESULT, None, None, None, excluded=excluded))
 
     @property
     def told(self) -> str:
@@ -179,3 +179,18 @@ def test_a_box_without_the_object_and_one_too_many_are_told(
     tab.view._do("shadow", UNDO)
     tab.view.redraw()
     assert "are the most" not in tab.told
+
+
+def test_samples_stay_with_their_image_when_others_are_left_out() -> None:
+    tab = Tab()
+    tab.view._do("shadow", START)
+    tab.show(3)
+    tab.view.take_box(BOX)
+    tab.show(1, excluded=(0, 2))
+    assert len(tab.boxes[-1]) == 1
+    tab.view.take_box(BOX)
+    tab.show(3)
+    assert len(tab.boxes[-1]) == 2
+    tab.show(1, excluded=(3, 0))
+    assert tab.boxes[-1] == ()
+    assert {sample.image for sample in tab.view._samples} == {3}

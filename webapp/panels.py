@@ -6,13 +6,13 @@ from functools import partial
 
 import viser
 
-from photolin.analysis import Method
-from photolin.factors import LETTERS, Factor, Thresholds
+from photolin.factors import LETTERS, Factor
 from photolin.stack import ImageStack
 
 from .canvas import Canvas
 from .clicks import Clicks
 from .frame import Frame
+from .saved import Saved
 from .state import Pixel, ViewState
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
@@ -20,6 +20,7 @@ from .views.export import ExportView
 from .views.help import HelpView
 from .views.landscape import LandscapeView
 from .views.legend import LegendView
+from .views.notes import NotesView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
@@ -50,6 +51,10 @@ class Actions:
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
     """Take all pins away."""
+    exclude: Callable[[int], None]
+    """Leave an image of the whole stack out, or take it in again."""
+    copy: Callable[[], None]
+    """Copy the command that makes what is shown."""
     tell: Callable[[Exception], None]
     """Say what went wrong."""
 
@@ -62,22 +67,25 @@ class Panels:
         client: viser.ClientHandle,
         canvas: Canvas,
         stack: ImageStack,
-        method: Method,
-        first: Thresholds,
+        state: ViewState,
         actions: Actions,
+        *,
+        known: bool,
     ) -> None:
         """Build them.
 
         Args:
-            method: whose result is shown at first.
-            first: where the sliders stand at first.
+            known: whether frames come with the truth.
+            state: whose method and thresholds are set at first.
         """
         gui, changed, clicks = client.gui, actions.changed, Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
-            self.thresholds = ThresholdView(gui, first, changed, actions.suggest, actions.linearize)
-            self.run = RunView(gui, method, changed, actions.stop)
+            self.thresholds = ThresholdView(
+                gui, state.thresholds, changed, actions.suggest, actions.linearize
+            )
+            self.run = RunView(gui, state.method, changed, actions.stop)
             shares = SharesView(gui)
             self.pixel = PixelView(gui, changed)
             with gui.add_folder("Display"):
@@ -87,10 +95,12 @@ class Panels:
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self.thresholds.add_steps(gui)
             setters = (self.thresholds.set_T, self.thresholds.set_Ts)
-            self.samples = SamplesView(gui, clicks, canvas, stack, changed, *setters)
+            self.samples = SamplesView(gui, clicks, canvas, changed, *setters)
             canvas.on_box(self.samples.take_box)
         with tabs.add_tab("Map", viser.Icon.MAP):
-            self.landscape = LandscapeView(gui, clicks, stack, self.thresholds.set, actions.tell)
+            self.landscape = LandscapeView(
+                gui, clicks, self.thresholds.set, actions.tell, known=known
+            )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
@@ -99,6 +109,8 @@ class Panels:
             self.shape = ShapeView(gui, stack, changed, actions.recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self.export = ExportView(gui, actions.download)
+            with gui.add_folder("Session"):
+                self.notes = NotesView(gui, changed, actions.copy)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)
@@ -118,6 +130,12 @@ class Panels:
         for view in self._readers:
             state = view.read(state)
         return state
+
+    def restore(self, saved: Saved) -> None:
+        """Set all widgets as a session was kept."""
+        for view in self._readers:
+            view.restore(saved.state)
+        self.notes.restore(saved.notes)
 
     def draw(self, frame: Frame) -> None:
         """Show a frame in all panels."""
@@ -166,6 +184,7 @@ class Panels:
             "b": self.compare.flicker,
             "x": partial(self.diagnosis.next, Factor.SPECULAR),
             "u": partial(self.diagnosis.next, Factor.UNDEFINED),
+            "c": actions.copy,
             "n": actions.recover,
             "d": self.shape.toggle,
             "escape": lambda: (actions.stop(), self.samples.stop()),

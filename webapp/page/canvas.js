@@ -149,6 +149,7 @@ window.openCanvas = (options) => {
     setReadout: marks.setReadout,
     setSampling: band.setSampling,
     setBoxes: band.setBoxes,
+    copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };
 };

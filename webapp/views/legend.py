@@ -70,6 +70,15 @@ class LegendView:
         """Show or hide a class."""
         self._switches[factor].value = not self._switches[factor].value
 
+    def restore(self, state: ViewState) -> None:
+        """Set the switches of a state, its opacity, outlines, gain and encoding."""
+        for factor, handle in self._switches.items():
+            handle.value = factor in state.shown
+        self._opacity.value, self._outlines.value = state.opacity, state.outlines
+        if state.gain is not None:
+            self._gain.value = min(max(state.gain, MIN_GAIN), MAX_GAIN)
+        self._encoding.value = state.encoding
+
     def read(self, state: ViewState) -> ViewState:
         """The state with switches, opacity, outlines and gain as set here."""
         return replace(

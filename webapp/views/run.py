@@ -59,6 +59,10 @@ class RunView:
         self._stage.content = f'<div style="{INDENT};font-size:0.8em">{escape(stage)}</div>'
         self._bar.value = round(100 * min(max(fraction, 0.04), 1))
 
+    def restore(self, state: ViewState) -> None:
+        """Set the method of a state."""
+        self._method.value = state.method
+
     def read(self, state: ViewState) -> ViewState:
         """The state with the method as set here."""
         return replace(state, method=choose_option(self._method.value, METHODS, self._fallback))

@@ -1,13 +1,13 @@
 """Ts the paper's way, from pixels that someone points out, and T from the residuals."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import viser
 
 from photolin.analysis import Analysis
 from photolin.residuals import Residuals, measure_residuals
 from photolin.shadow_level import ShadowLevel, sample_shadow_level
-from photolin.stack import ImageStack
 
 from ..box import Box, box_around
 from ..canvas import Canvas
@@ -50,7 +50,6 @@ class SamplesView(Watched):
         gui: viser.GuiApi,
         clicks: Clicks,
         canvas: Canvas,
-        stack: ImageStack,
         changed: Callable[[], None],
         set_T: Callable[[float], None],
         set_Ts: Callable[[float], None],
@@ -61,7 +60,7 @@ class SamplesView(Watched):
             changed: asks that `redraw` is called soon, by the thread that draws.
             set_T, set_Ts: move the sliders.
         """
-        self._changed, self._canvas, self._stack = changed, canvas, stack
+        self._changed, self._canvas = changed, canvas
         self._picking: Kind | None = None
         self._samples: tuple[Sample, ...] = ()
         self._note = ""
@@ -129,15 +128,18 @@ class SamplesView(Watched):
 
     def take(self, pixel: Pixel) -> bool:
         """Take the pixels around a click while sampling; whether they were taken."""
+        if self._frame is None:
+            return False
         reach = SIDES.get(self._side.value, 0)
-        return self.take_box(box_around(pixel, reach, self._stack.mask.shape))
+        return self.take_box(box_around(pixel, reach, self._frame.stack.shape[1:]))
 
     def take_box(self, box: Box) -> bool:
         """Take the mask pixels of a box in the image shown, while sampling; whether it was."""
-        kind = self._sampling()
-        if kind is None or self._frame is None:
+        kind, frame = self._sampling(), self._frame
+        if kind is None or frame is None:
             return False
-        sample = take_sample(self._stack, kind, self._frame.state.image, box)
+        found = take_sample(frame.stack, kind, frame.state.image, box)
+        sample = None if found is None else replace(found, image=number_of(frame))
         if sample is None:
             self._note = OUTSIDE
         elif len(self._samples) >= MOST_SAMPLES:
@@ -181,7 +183,7 @@ class SamplesView(Watched):
         super().draw(frame)
         kind = self._sampling()
         here = self._samples if kind is not None else ()
-        boxes = tuple((s.box, COLOURS[s.kind]) for s in here if s.image == frame.state.image)
+        boxes = tuple((s.box, COLOURS[s.kind]) for s in here if s.image == number_of(frame))
         if (kind, boxes) != self._sketched:
             self._sketched = (kind, boxes)
             self._canvas.set_sampling(None if kind is None else COLOURS[kind])
@@ -224,3 +226,11 @@ class SamplesView(Watched):
         self._set_T.label = f"Set T to {residuals.T:.4f}{passed}"
         self._set_T.disabled = False
         return plot_residuals(residuals.values, residuals.T, T)
+
+
+def number_of(frame: Frame) -> int:
+    """Number of the image shown among all images, those too that are left out."""
+    number = frame.state.image
+    for excluded in sorted(frame.excluded):
+        number += excluded <= number
+    return number
