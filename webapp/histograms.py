@@ -10,8 +10,8 @@ from photolin.factors import Factor, css_colour
 
 from .readout import escape
 
-WIDTH, HEIGHT = 300, 110
-LEFT, TOP, BOTTOM = 8, 8, 30
+WIDTH, HEIGHT = 300, 114
+LEFT, TOP, BOTTOM = 8, 18, 30
 BINS = 48
 BEYOND = 0.01
 """Share of values beyond the axis from which it is told."""
@@ -38,7 +38,7 @@ def plot_histogram(
     wide, high = WIDTH - 2 * LEFT, HEIGHT - TOP - BOTTOM
     parts = []
     for order, (values, colour) in enumerate(kinds):
-        parts.append(_tell_beyond(values, colour, top, TOP + 10 + 14 * order))
+        parts.append(_tell_beyond(values, colour, top, WIDTH - LEFT - 90 * order))
         counts, _ = np.histogram(values, BINS, (0, top))
         if not counts.any():
             continue
@@ -77,13 +77,13 @@ def plot_histogram(
     )
 
 
-def _tell_beyond(values: NDArray[np.floating], colour: str, top: float, y: float) -> str:
-    """The share of values that lie beyond the axis, at its right end; nothing for hardly any."""
+def _tell_beyond(values: NDArray[np.floating], colour: str, top: float, x: float) -> str:
+    """The share of values that lie beyond the axis, above its bars, ending at `x`; none for few."""
     beyond = float((values > top).mean()) if values.size else 0.0
     if beyond < BEYOND:
         return ""
     return (
-        f'<text x="{WIDTH - LEFT}" y="{y:g}" text-anchor="end">{beyond:.0%} beyond '
+        f'<text x="{x:g}" y="{TOP - 7}" text-anchor="end">{beyond:.0%} beyond '
         f'\N{RIGHTWARDS ARROW}<tspan fill="{colour}"> \N{BLACK SQUARE}</tspan></text>'
     )
 
