@@ -137,7 +137,7 @@ def choose_part(shape: tuple[int, int, int], window: Window | None) -> Part:
     """The part of a stack (K,H,W) worth linearizing: all of a small one, else what is seen."""
     K, H, W = shape
     most = min(MOST_PIXELS, MOST_OBSERVATIONS // K)
-    if window is None or H * W <= most:
+    if window is None or most >= H * W:
         window = Window(0, H, 0, W, 1.0)
     row0, row1, column0, column1, scale = window
     # one pixel for each of the screen, and no more than can be followed
