@@ -28,11 +28,31 @@ RECOVERED = Recovered(recover_shape(STACK, RESULT, resolve_ambiguity(RESULT)), R
 
 
 @dataclass
+class FakeSecond:
+    """Remembers what it was told of the second picture."""
+
+    calls: list[tuple[str, Any]]
+
+    def set_base(self, encoded: bytes, image_format: str) -> None:
+        self.calls.append((f"other {image_format}", decode(encoded)))
+
+    def set_overlay(self, encoded: bytes | None) -> None:
+        self.calls.append(("other overlay", None if encoded is None else decode(encoded)))
+
+    def arrange(self, arrangement: str | None, divider: float) -> None:
+        self.calls.append(("arrangement", (arrangement, divider)))
+
+
+@dataclass
 class FakeCanvas:
     """Remembers what it was told."""
 
     calls: list[tuple[str, Any]] = field(default_factory=list)
     readout: str = ""
+
+    @property
+    def second(self) -> FakeSecond:
+        return FakeSecond(self.calls)
 
     def set_base(self, encoded: bytes, image_format: str) -> None:
         self.calls.append((f"base {image_format}", decode(encoded)))
@@ -63,7 +83,8 @@ class FakeCanvas:
 
     def take(self) -> dict[str, Any]:
         """What was drawn since the last look, by part; no part twice."""
-        calls, self.calls = self.calls, []
+        calls = list(self.calls)
+        self.calls.clear()
         assert len({name for name, _ in calls}) == len(calls)
         return dict(calls)
 

@@ -19,6 +19,7 @@ import viser
 from photolin.shape.recover import Shape
 
 from .relief import MESH, Relief
+from .second import PLANES, Second
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -67,6 +68,7 @@ class Canvas:
             for name in ("hover", "pick", "key", "view", "light")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
+        self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -79,6 +81,8 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "others": PLANES,
+            "dividerId": self.second.divider_id,
         }
         call_javascript(client, "window.openCanvas", options)
 

@@ -32,7 +32,7 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 | M | next method |
 | P | pin the selected pixel to compare with |
 | X, U | next image where it is specular, undefined |
-| B | compare: all of one picture, all of the other |
+| B, Shift-B | compare: one picture alone and the other in turn, both again |
 | 1 … 5 | show or hide D, S, A, C, U |
 | space held | without overlay |
 | N | recover the shape, as the tab Shape says |
