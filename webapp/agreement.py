@@ -84,11 +84,11 @@ def _block(title: str, counts: NDArray[np.int64], *, truth: bool) -> str:
     total = int(counts.sum())
     apart = total - int(counts.trace())
     share = 100 * apart / max(total, 1)
-    text = f"<b>{title}</b>: {_percent(share, apart)} of {total} labels differ."
+    text = f"<b>{title}</b>: {_percent(share, apart)} % of {total} labels differ."
     right = accuracies(counts)
     if truth and total:
         text += f" Macro accuracy {np.nanmean(right):.2f} %."
-    head = "".join(f"<th>{_letter(factor)}</th>" for factor in ORDER)
+    head = "".join(f'<th style="{CELL}">{_letter(factor)}</th>' for factor in ORDER)
     body = "".join(
         f'<tr title="{TITLES[factor]}: {row.sum()} labels of the right picture">'
         f"<th>{_letter(factor)}</th>{_cells(row, r)}"
@@ -100,12 +100,12 @@ def _block(title: str, counts: NDArray[np.int64], *, truth: bool) -> str:
         f'<p style="margin:0.7em 0 0.2em">{text}</p>'
         '<table class="photolin-agreement" style="border-collapse:collapse;'
         'font-variant-numeric:tabular-nums">'
-        f'<tr><th style="font-weight:400;padding-right:0.5em">{rows} ↓ left →</th>{head}'
-        f'<th style="font-weight:400">pixels</th></tr>{body}</table>'
+        f'<tr><th style="{CELL};font-weight:400">{rows}, %</th>{head}'
+        f'<th style="{CELL};font-weight:400">pixels</th></tr>{body}</table>'
     )
 
 
-CELL = "text-align:right;padding:0.05em 0.45em"
+CELL = "text-align:right;padding:0.05em 0.4em;white-space:nowrap"
 
 
 def _cells(row: NDArray[np.int64], diagonal: int) -> str:
@@ -123,8 +123,8 @@ def _cell(count: int, row: int, agrees: bool) -> str:
 def _percent(share: float, count: int) -> str:
     """Two decimals, and never 0.00 or 100.00 for what is some but few, or all but few."""
     if count and share < 0.005:
-        return "&lt;0.01 %"
-    return f"{min(share, 99.99) if share < 100 else share:.2f} %"
+        return "&lt;0.01"
+    return f"{min(share, 99.99) if share < 100 else share:.2f}"
 
 
 def _letter(factor: Factor) -> str:
