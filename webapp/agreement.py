@@ -87,7 +87,7 @@ def _block(title: str, counts: NDArray[np.int64], *, truth: bool) -> str:
     text = f"<b>{title}</b>: {_percent(share, apart)} % of {total} labels differ."
     right = accuracies(counts)
     if truth and total:
-        text += f" Macro accuracy {np.nanmean(right):.2f} %."
+        text += f" Macro accuracy {_percent(float(np.nanmean(right)), 1)} %."
     head = "".join(f'<th style="{CELL}">{_letter(factor)}</th>' for factor in ORDER)
     body = "".join(
         f'<tr title="{TITLES[factor]}: {row.sum()} labels of the right picture">'

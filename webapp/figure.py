@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from photolin.analysis import METHODS, Analysis, Cancel, Progress
+from photolin.analysis import METHODS, Analysis, Cancel, Method, Progress
 from photolin.errors import Cancelled
 from photolin.export import safe_name
 from photolin.figures import FIGURES, OF_ALL_METHODS, OF_ONE_IMAGE, Figure, draw_figure
@@ -26,7 +26,8 @@ def make_figure(
     Raises:
         Cancelled: `cancel` returned true.
     """
-    figure, results = KINDS[kind], {state.method: shown}
+    figure = KINDS[kind]
+    results: dict[Method, Analysis] = {state.method: shown}
     for method in METHODS if figure in OF_ALL_METHODS else ():
         if method not in results:
             options = replace(runs.options, method=method, T=state.T, Ts=state.Ts)
