@@ -132,7 +132,9 @@ def _inputs(stack: ImageStack, analysis: Analysis) -> list[Panel]:
 def _bases(stack: ImageStack, results: Mapping[Method, Analysis]) -> list[list[Panel]]:
     """The base images of the first result, linearized by each, all to one scale."""
     bases = next(iter(results.values())).base_images
-    made = [(m, [a.linearized(k) for k in bases]) for m, a in _ordered(results)]
+    made: list[tuple[Method, list[NDArray[np.float32]]]] = [
+        (m, [a.linearized(k) for k in bases]) for m, a in _ordered(results)
+    ]
     scale = _scale([one for _, images in made for one in images], stack.mask)
     return [
         [
