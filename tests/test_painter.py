@@ -413,3 +413,21 @@ def test_a_rough_second_picture_is_made_exact_too(
     assert {"base jpeg", "other jpeg"} <= set(canvas.take())
     assert painter.paint(frame(**BOTH), None, rested=True) is False
     assert set(canvas.take()) == {"base png", "other png"}
+
+
+def test_before_there_is_a_result_the_truth_alone_has_labels(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    runs = Runs(STACK, Options(), truth=np.full(STACK.shape, Factor.CAST, np.uint8))
+
+    def draw(against: Any, pointer: tuple[int, int] | None) -> dict[str, Any]:
+        shown = ViewState(T=0.05, Ts=0.02, against=against)
+        painter.paint(compose(runs, {}, shown), pointer, rested=True)
+        return canvas.take()
+
+    assert draw("labels", (3, 4))["other overlay"] is None
+    assert canvas.readout == f"row 3  column 4  i {STACK.images[0, 3, 4]:.3f}"
+    draw("labels", None)
+    assert canvas.readout == "left: robust, input\nright: robust, labels"
+    assert (draw("truth", None)["other overlay"] == (*PALETTE[Factor.CAST], 255)).all()
+    assert canvas.readout == "left: robust, input\nright: truth"

@@ -12,7 +12,7 @@ from .layers import SIGNED, hides_labels, render_layer
 from .readout import status_line
 from .render import encode_jpeg, encode_labels, encode_png
 from .second import Second
-from .state import ENCODINGS, SURFACE, Pixel, ViewState
+from .state import ENCODINGS, SURFACE, TRUTH, Pixel, ViewState
 
 KEPT = 32
 """Encoded pictures kept for stepping back and forth."""
@@ -150,8 +150,8 @@ class Painter:
         first = self._first.legend + (HIDDEN if told else "")
         if apart is None:
             return first
-        second = apart.analysis
-        right = "truth" if second is None else f"{second.options.method}, {self._second.legend}"
+        by = frame.state.method if apart.analysis is None else apart.analysis.options.method
+        right = TRUTH if frame.state.against == TRUTH else f"{by}, {self._second.legend}"
         names = {"left": f"left: {frame.state.method}, {first}", "right": f"right: {right}"}
         alone = names.get(frame.state.arrangement)
         return "\n".join(names.values()) if alone is None else alone
@@ -200,8 +200,10 @@ def describe(frame: Frame, pixel: Pixel, other: Frame | None = None) -> str:
     letter = ""
     if other.labels is not None and (label := int(other.labels[row, column])) != OUTSIDE:
         letter = LETTERS[Factor(label)]
-    if other.analysis is None:
+    if frame.state.against == TRUTH:
         return f"left:  {first}\nright: truth {letter}"
+    if other.analysis is None:
+        return first
     l = _linearized_at(other.analysis, other.state.image, pixel)
     values = f"i {i:.3f}  l {l:z.3f}  residual {i - l:+z.3f}  {letter}"
     return f"left:  {first}\nright: row {row}  column {column}  {values}"
