@@ -6,6 +6,7 @@ window.openCanvas = (options) => {
 
   const NEAREST = 1003; // three.js NearestFilter
   const POST_MS = 50, VIEW_MS = 150;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
 
   const { rows, columns, planes, others, viewId } = options;
   const viewer = window.__viserMutable;
@@ -42,13 +43,14 @@ window.openCanvas = (options) => {
     viewer.requestRender();
   }
 
-  const page = { ...options, viewer, layer, listen, send, sender, peek };
+  const page = { ...options, viewer, layer, listen, send, sender, peek, CLICK_PIXELS };
   const camera = openCamera(page);
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
   const compare = openCompare({ ...page, camera });
-  openInput({ ...page, camera });
+  const band = openBand({ ...page, camera });
+  openInput({ ...page, camera, band });
 
   // --- before each frame ---
 
@@ -74,6 +76,7 @@ window.openCanvas = (options) => {
       }),
     );
     compare.draw();
+    band.draw();
     marks.draw();
     tellView();
   }
@@ -133,6 +136,7 @@ window.openCanvas = (options) => {
 
   function close() {
     closing.abort();
+    band.setSampling(null);
     clearTimeout(viewTimer);
     layer.remove();
     style.remove();
@@ -148,6 +152,8 @@ window.openCanvas = (options) => {
     setLight: light.setLight,
     setComparison: compare.set,
     setReadout: marks.setReadout,
+    setSampling: band.setSampling,
+    setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };
