@@ -20,6 +20,7 @@ from photolin.shape.recover import Shape
 
 from .box import Box, box_in_text
 from .relief import MESH, Relief
+from .second import PLANES, Second
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -68,6 +69,7 @@ class Canvas:
             for name in ("hover", "pick", "key", "view", "light", "band")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
+        self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -80,6 +82,8 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "others": PLANES,
+            "dividerId": self.second.divider_id,
             "bandId": widget_id(self._band),
         }
         call_javascript(client, "window.openCanvas", options)

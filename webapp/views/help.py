@@ -20,6 +20,10 @@ gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and 
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 
+The tab *Compare* sets another layer, another method or the true labels beside what is shown: split
+at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
+turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
+
 | key | does |
 |---|---|
 | ← → | previous, next image |
@@ -32,7 +36,7 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 | M | next method |
 | P | pin the selected pixel to compare with |
 | X, U | next image where it is specular, undefined |
-| B | compare: all of one picture, all of the other |
+| B, Shift-B | compare: one picture alone and the other in turn, both again |
 | 1 … 5 | show or hide D, S, A, C, U |
 | space held | without overlay |
 | N | recover the shape, as the tab Shape says |
