@@ -28,6 +28,16 @@ class Click(NamedTuple):
     """From its upper border to its lower, 0 to 1."""
 
 
+class Choice(NamedTuple):
+    """A click on a numbered part of an element."""
+
+    name: str
+    part: str
+    """What kind of part it is, small letters."""
+    number: int
+    """Up to six digits; whether there is such a part is for the caller to say."""
+
+
 class Sight(NamedTuple):
     """An element came into view or went out of it."""
 
@@ -41,6 +51,7 @@ class Clicks:
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
         self._clicked: dict[str, Callable[[float, float], None]] = {}
+        self._chosen: dict[str, Callable[[str, int], None]] = {}
         self._seen: dict[str, Callable[[bool], None]] = {}
         self._field = client.gui.add_text("clicks", "", visible=False)
         run_javascript(client, _javascript())
@@ -51,6 +62,8 @@ class Clicks:
             match event_in_text(self._field.value):
                 case Click(name, x, y) if name in self._clicked:
                     self._clicked[name](x, y)
+                case Choice(name, part, number) if name in self._chosen:
+                    self._chosen[name](part, number)
                 case Sight(name, shown) if name in self._seen:
                     self._seen[name](shown)
 
@@ -72,6 +85,23 @@ class Clicks:
         call_javascript(self._client, "window.photolinClicks.watch", name)
         return f"photolin-{name}"
 
+    def watch_parts(self, name: str, chosen: Callable[[str, int], None]) -> str:
+        """Call back with which part of an element is clicked.
+
+        Parts say what they are in an attribute: data-part="image-12" is the part "image" with the
+        number 12. Of parts within each other the innermost counts.
+
+        Args:
+            name: as `watch` takes it.
+            chosen: called with what the page says: 1 to 12 small letters, and a number from 0 to
+                999999. There need not be such a part.
+
+        Returns:
+            As `watch`.
+        """
+        self._chosen[name] = chosen
+        return self.watch(name, _ignore, lambda shown: None)
+
     def see(self, name: str, seen: Callable[[bool], None]) -> str:
         """`watch` without clicks."""
         return self.watch(name, _ignore, seen)
@@ -81,16 +111,21 @@ def _ignore(x: float, y: float) -> None:
     """Clicks on an element that is only looked at."""
 
 
-def event_in_text(text: str) -> Click | Sight | None:
-    """What the page wrote as "number name x,y", "number name shown" or "... hidden", or None."""
+def event_in_text(text: str) -> Click | Choice | Sight | None:
+    """What the page wrote, or None: "number name" and then x,y or part-number, shown or hidden."""
     number = r"([01]\.[0-9]{1,6})"
     found = re.fullmatch(
-        rf"[0-9]{{1,9}} ([a-z-]{{1,40}}) (?:{number},{number}|(shown|hidden))", text, re.ASCII
+        rf"[0-9]{{1,9}} ([a-z-]{{1,40}}) "
+        rf"(?:{number},{number}|(shown|hidden)|([a-z]{{1,12}})-([0-9]{{1,6}}))",
+        text,
+        re.ASCII,
     )
     if found is None:
         return None
     if found[4] is not None:
         return Sight(found[1], found[4] == "shown")
+    if found[5] is not None:
+        return Choice(found[1], found[5], int(found[6]))
     x, y = float(found[2]), float(found[3])
     return Click(found[1], x, y) if x <= 1 and y <= 1 else None
 

@@ -19,11 +19,11 @@ LINE = (255, 255, 255)
 
 def other_frame(frame: Frame, layer: Layer) -> Frame:
     """What is compared with: another layer, by the method beside where there is one."""
-    analysis, labels = frame.analysis, frame.labels
+    analysis, labels, often = frame.analysis, frame.labels, frame.often
     if frame.state.beside is not None and frame.beside is not None:
-        analysis, labels = frame.beside, frame.beside_labels
+        analysis, labels, often = frame.beside, frame.beside_labels, frame.beside_often
     state = replace(frame.state, layer=layer)
-    return replace(frame, state=state, analysis=analysis, labels=labels, preview=None)
+    return replace(frame, state=state, analysis=analysis, labels=labels, often=often, preview=None)
 
 
 def lay_over(picture: Picture, frame: Frame, hidden: bool) -> Picture:

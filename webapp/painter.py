@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .canvas import Canvas
 from .compare import differ, lay_over, other_frame, split
 from .frame import Frame
+from .often import caption_often, render_often
 from .readout import status_line
 from .render import (
     choose_scale,
@@ -67,6 +68,8 @@ class Painter:
         shape = frame.shape if state.layer in SURFACE else None
         light = state.light if state.layer == "relit" else None
         look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
+        if counts(frame):  # of all images, whichever is shown
+            look = (state.layer, frame.analysis, state.thresholds, state.often)
         compared = compared_with(frame)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
@@ -94,7 +97,8 @@ class Painter:
                 picture = lay_beside(frame, picture, frame.state.against)
             found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
         # others would keep results alive
-        if frame.state.layer not in (*SIGNED, *SURFACE) and frame.state.against is None:
+        kept = frame.state.layer not in (*SIGNED, *SURFACE) and not counts(frame)
+        if kept and frame.state.against is None:
             self._encoded[key] = found  # the latest are last
         for oldest in list(self._encoded)[:-KEPT]:
             del self._encoded[oldest]
@@ -143,7 +147,7 @@ def compared_with(frame: Frame) -> tuple[object, ...] | None:
     s = frame.state
     if s.against is None:
         return None
-    how = (s.against, s.divider, s.difference, s.shown, s.opacity, s.thresholds, s.light)
+    how = (s.against, s.divider, s.difference, s.shown, s.opacity, s.thresholds, s.light, s.often)
     return (*how, frame.analysis, frame.beside, frame.preview, frame.shape)
 
 
@@ -163,7 +167,12 @@ def hides_labels(frame: Frame) -> bool:
     """
     state = frame.state
     coloured = state.layer in SIGNED or (state.layer in SURFACE and frame.shape is not None)
-    return coloured and frame.labels is not None and not state.outlines
+    return (coloured or counts(frame)) and frame.labels is not None and not state.outlines
+
+
+def counts(frame: Frame) -> bool:
+    """Whether the picture is of all images at once, how often a pixel is something."""
+    return frame.state.layer == "how often" and frame.often is not None
 
 
 def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
@@ -171,6 +180,9 @@ def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
     state, stack = frame.state, frame.stack
     if state.layer in SURFACE and frame.shape is not None:
         return render_surface(frame.shape, state.layer, state.light, stack.mask)
+    if counts(frame) and frame.often is not None:
+        caption = caption_often(frame.often, len(stack.images), state.often)
+        return render_often(frame.often, stack.mask), caption
     if frame.analysis is None or state.layer not in SIGNED:
         gain = state.gain or 1.0
         shown = "" if gain == 1 else f", shown {gain:g} times brighter"
@@ -189,6 +201,11 @@ def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
 def describe(frame: Frame, pixel: Pixel) -> str:
     """The values of a pixel (row, column) in the image shown, in one line."""
     row, column = pixel
+    if counts(frame) and frame.often is not None:
+        if not frame.stack.mask[pixel]:
+            return f"row {row}  column {column}  outside the mask"
+        n, K = frame.often[pixel], len(frame.stack.images)
+        return f"row {row}  column {column}  {frame.state.often} in {n} of {K} images"
     k = frame.state.image
     i = float(frame.stack.images[k, row, column])
     if frame.analysis is None or frame.labels is None:

@@ -7,10 +7,22 @@ from photolin.analysis import METHODS, Method
 from photolin.errors import OptionError
 from photolin.factors import Factor, Thresholds
 
-Layer = Literal["input", "linearized", "residual", "labels", "albedo", "normals", "depth", "relit"]
+Layer = Literal[
+    "input",
+    "linearized",
+    "residual",
+    "labels",
+    "how often",
+    "albedo",
+    "normals",
+    "depth",
+    "relit",
+]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 """Layers that are there once a shape is."""
+Often = Literal["specular", "lit", "attached shadow", "cast shadow", "any shadow", "undefined"]
+OFTEN: tuple[Often, ...] = get_args(Often)
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
@@ -26,7 +38,10 @@ class ViewState:
     image: int = 0
     """Image number, from 0."""
     layer: Layer = "input"
-    """The picture under the overlay; labels: the label map alone, opaque."""
+    """The picture under the overlay; labels: the label map alone, opaque; how often: in how many
+    images a pixel is what `often` says."""
+    often: Often = "specular"
+    """What the layer how often counts; lit: diffuse or specular."""
     method: Method = "robust"
     """Whose result is shown."""
     beside: Method | None = None
@@ -70,6 +85,8 @@ class ViewState:
             raise OptionError(f"image is {self.image}; accepted is a number from 0")
         if self.layer not in LAYERS:
             raise OptionError(f"layer is {self.layer!r}; accepted are {', '.join(LAYERS)}")
+        if self.often not in OFTEN:
+            raise OptionError(f"often is {self.often!r}; accepted are {', '.join(OFTEN)}")
         if self.method not in METHODS:
             raise OptionError(f"method is {self.method!r}; accepted are {', '.join(METHODS)}")
         if self.beside is not None and self.beside not in METHODS:
