@@ -85,7 +85,9 @@ class Clicks:
         call_javascript(self._client, "window.photolinClicks.watch", name)
         return f"photolin-{name}"
 
-    def watch_parts(self, name: str, chosen: Callable[[str, int], None]) -> str:
+    def watch_parts(
+        self, name: str, chosen: Callable[[str, int], None], seen: Callable[[bool], None]
+    ) -> str:
         """Call back with which part of an element is clicked.
 
         Parts say what they are in an attribute: data-part="image-12" is the part "image" with the
@@ -95,12 +97,13 @@ class Clicks:
             name: as `watch` takes it.
             chosen: called with what the page says: 1 to 12 small letters, and a number from 0 to
                 999999. There need not be such a part.
+            seen: as `watch` takes it.
 
         Returns:
             As `watch`.
         """
         self._chosen[name] = chosen
-        return self.watch(name, _ignore, lambda shown: None)
+        return self.watch(name, _ignore, seen)
 
     def see(self, name: str, seen: Callable[[bool], None]) -> str:
         """`watch` without clicks."""

@@ -1,4 +1,6 @@
-"""In how many images a pixel is of a class, as a picture and in words. Pure."""
+"""How often classes are, at each pixel and in each image; in pictures and in words. Pure."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,23 @@ def label_all(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> 
     return label_images(
         stack.images, analysis.linearized_bases, analysis.coefficients, stack.mask, thresholds
     )
+
+
+def share_classes(
+    labels: NDArray[np.uint8], mask: NDArray[np.bool_], kept: Sequence[int]
+) -> dict[int, NDArray[np.float64]]:
+    """(5,) share of each Factor code among the mask pixels, by number of the whole stack.
+
+    Args:
+        labels: (K,H,W) of the images that are left.
+        mask: (H,W)
+        kept: their numbers in the whole stack, K.
+    """
+    inside = int(mask.sum())
+    return {
+        k: np.array([np.count_nonzero(one == np.uint8(f)) for f in sorted(Factor)]) / inside
+        for k, one in zip(kept, labels, strict=True)
+    }
 
 
 def render_often(counts: NDArray[np.uint16], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:

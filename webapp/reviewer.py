@@ -15,8 +15,8 @@ from photolin.stack import ImageStack
 
 from .frame import Frame
 from .job import Job
-from .often import label_all
-from .strip import Health, judge, share_classes
+from .often import label_all, share_classes
+from .strip import Health, judge
 from .thumbnails import Sheet, make_sheet
 
 KEPT = 4
@@ -36,24 +36,24 @@ class Reviewer:
         self,
         whole: ImageStack,
         changed: Callable[[], None],
-        progress: Callable[[float | None], None],
         tell: Callable[[Exception], None],
     ) -> None:
-        """Begin nothing yet; all that is given is called from a thread.
+        """Begin nothing yet; what is given is called from a thread.
 
         Args:
             whole: the stack with all its images.
             changed: called when there is more to show.
-            progress: called with the fraction that is done where that takes long, then with None.
             tell: called with what went wrong.
         """
-        self._whole, self._changed, self._progress, self._tell = whole, changed, progress, tell
+        self._whole, self._changed, self._tell = whole, changed, tell
         self.sheet: Sheet | None = None
         """All thumbnails; None until they are there."""
         self.shares: Mapping[int, NDArray[np.float64]] = {}
         """(5,) share of each Factor code, by number of the whole stack."""
         self.health: Mapping[int, Health] = {}
         """By number of the whole stack; of images left out as they were when they were there."""
+        self.fraction: float | None = None
+        """Of the review, where it takes long; else None."""
         self._lock = RLock()
         self._frame: Frame | None = None
         self._counted: tuple[Analysis, Thresholds] | None = None
@@ -88,6 +88,11 @@ class Reviewer:
         """Whether `health` is of the result of a frame."""
         wanted = reviewed_of(frame)
         return any(result is wanted for result, _ in self._reviews)
+
+    def is_declined(self, frame: Frame) -> bool:
+        """Whether the review of a frame's result was cancelled, or failed."""
+        wanted = reviewed_of(frame)
+        return wanted is not None and wanted is self._declined
 
     def _pursue(self) -> None:
         """Make what is lacking, unless something is being made: if overtaken, that is stopped."""
@@ -134,8 +139,7 @@ class Reviewer:
             self._tell(error)
         finally:
             with self._lock:
-                self._making = None
-            self._progress(None)
+                self._making = self.fraction = None
 
     def _review(self, frame: Frame) -> None:
         analysis = reviewed_of(frame)
@@ -149,7 +153,8 @@ class Reviewer:
         """Between two images: the shares follow T and Ts meanwhile."""
         self._count()
         if monotonic() - self._began > PATIENCE:
-            self._progress(fraction)
+            self.fraction = fraction
+            self._changed()
 
     def _count(self) -> None:
         frame = self._frame

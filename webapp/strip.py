@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.factors import LETTERS, TITLES, Factor, css_colour
+from photolin.factors import LETTERS, TITLES, css_colour
 from photolin.overview import ImageReview
 
 from .readout import escape
@@ -36,13 +36,17 @@ STYLE = """
 font-size:.72rem;line-height:1.3;box-shadow:0 0 0 1px rgba(128,128,128,.35)!important}
 .photolin-card.now{box-shadow:0 0 0 2px var(--mantine-primary-color-filled,#228be6)!important}
 .photolin-card.out{opacity:.55;cursor:default}
-.photolin-thumb{background-color:#000;border-radius:3px}
-.out .photolin-thumb{opacity:.45;filter:grayscale(1)}
+.photolin-thumb{background-color:#000;border-radius:3px;filter:brightness(var(--photolin-gain,1))}
+.out .photolin-thumb{opacity:.45}
 .photolin-corner{position:absolute;top:3px;right:3px;width:1.4em;height:1.4em;line-height:1.35em;
 text-align:center;border-radius:3px;background:rgba(0,0,0,.6);color:#fff;cursor:pointer;opacity:.75}
 .photolin-corner:hover{opacity:1;background:#000}
 .photolin-name{overflow:hidden;text-overflow:ellipsis;white-space:nowrap}
 .photolin-bar{height:.45em;border-radius:2px;background-color:rgba(128,128,128,.25)}
+.photolin-status{font-size:.85em;line-height:1.35;white-space:nowrap}
+.photolin-line{display:flex;align-items:center;gap:.6rem;height:1.35em}
+.photolin-line .photolin-bar{flex:1}
+.photolin-cancel{cursor:pointer;text-decoration:underline}
 .photolin-badge{display:inline-block;margin:2px 3px 0 0;padding:0 .35em;border-radius:3px;
 background:#F0E442;color:#000}
 .photolin-badge.gone{background:rgba(128,128,128,.4);color:inherit}
@@ -55,7 +59,7 @@ class Health:
     """What a review says of one image, by its number in the whole stack."""
 
     badges: tuple[tuple[str, str], ...]
-    """(short word, sentence) of each finding."""
+    """(short word, its sentences) of what stands out."""
     facts: str
     """Its numbers, in a sentence."""
 
@@ -84,31 +88,18 @@ def judge(reviews: Sequence[ImageReview], kept: Sequence[int]) -> dict[int, Heal
     told = {f"image {k} ({r.name})": f"image {kept[k]} ({r.name})" for k, r in enumerate(reviews)}
     mentions = re.compile("|".join(map(re.escape, told)))
 
-    def call(sentence: str) -> tuple[str, str]:
-        plain = mentions.sub("it", sentence)
-        word = next((word for words, word in BADGES if words in plain), "doubt")
-        return word, mentions.sub(lambda found: told[found[0]], sentence)
+    def gather(findings: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        found: dict[str, list[str]] = {}
+        for sentence in findings:
+            plain = mentions.sub("it", sentence)
+            word = next((word for words, word in BADGES if words in plain), "doubt")
+            whole = mentions.sub(lambda match: told[match[0]], sentence)
+            found.setdefault(word, []).append(f"{whole[0].upper()}{whole[1:]}.")
+        return tuple((word, " ".join(sentences)) for word, sentences in found.items())
 
     return {
-        kept[k]: Health(tuple(map(call, review.findings)), _tell_facts(review))
+        kept[k]: Health(gather(review.findings), _tell_facts(review))
         for k, review in enumerate(reviews)
-    }
-
-
-def share_classes(
-    labels: NDArray[np.uint8], mask: NDArray[np.bool_], kept: Sequence[int]
-) -> dict[int, NDArray[np.float64]]:
-    """(5,) share of each Factor code among the mask pixels, by number of the whole stack.
-
-    Args:
-        labels: (K,H,W) of the images that are left.
-        mask: (H,W)
-        kept: their numbers in the whole stack, K.
-    """
-    inside = int(mask.sum())
-    return {
-        k: np.array([np.count_nonzero(one == np.uint8(f)) for f in sorted(Factor)]) / inside
-        for k, one in zip(kept, labels, strict=True)
     }
 
 
@@ -131,15 +122,26 @@ def deal_cards(
     return cards
 
 
-def draw_strip(cards: Sequence[Card], now: int | None, sheet: Sheet | None, element_id: str) -> str:
+def draw_strip(
+    cards: Sequence[Card],
+    now: int | None,
+    sheet: Sheet | None,
+    gain: float | None,
+    element_id: str,
+) -> str:
     """HTML of the cards, without thumbnails until there is a sheet; `style_strip` goes with it.
 
     Args:
         now: number of the image shown.
+        gain: how many times brighter than stored thumbnails are shown; None as the sheet is.
         element_id: of the whole, for clicks on the parts "image" and "toggle".
     """
     drawn = "".join(_draw(card, card.number == now, sheet) for card in cards)
-    return f'<div id="{escape(element_id)}" class="photolin-cards">{drawn}</div>'
+    brighter = 1 if sheet is None or gain is None else gain / sheet.gain
+    return (
+        f'<div id="{escape(element_id)}" class="photolin-cards" '
+        f'style="--photolin-gain:{brighter:.4g}">{drawn}</div>'
+    )
 
 
 def style_strip(sheet: Sheet | None) -> str:
@@ -163,6 +165,26 @@ def summarize_strip(cards: Sequence[Card]) -> str:
             else f"{odd or 'none'} stand{'s' * (odd == 1)} out"
         )
     return ", ".join(parts) + "."
+
+
+def draw_status(text: str, note: str, fraction: float | None) -> str:
+    """HTML of two lines: a sentence; a note, beside it how far work is, and the part "cancel".
+
+    Always as high: what is below stays under the pointer.
+    """
+    bar = ""
+    if fraction is not None:
+        done = round(100 * min(max(fraction, 0.0), 1.0))
+        bar = (
+            f'<div class="photolin-bar" role="progressbar" '
+            f'aria-valuenow="{done}" style="background-image:linear-gradient(90deg,'
+            f'currentColor {done}%,transparent 0)"></div><div class="photolin-cancel" '
+            'data-part="cancel-0" title="Stop looking at the images">cancel</div>'
+        )
+    return (
+        f'<div class="photolin-status"><div>{escape(text)}</div>'
+        f'<div class="photolin-line"><div>{escape(note)}</div>{bar}</div></div>'
+    )
 
 
 def _draw(card: Card, now: bool, sheet: Sheet | None) -> str:

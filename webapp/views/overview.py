@@ -13,7 +13,7 @@ from ..frame import Frame
 from ..readout import escape
 from ..reviewer import Reviewer, kept_images, reviewed_of
 from ..state import OFTEN, ViewState
-from ..strip import ORDERS, Order, deal_cards, draw_strip, style_strip, summarize_strip
+from ..strip import ORDERS, Order, deal_cards, draw_status, draw_strip, style_strip, summarize_strip
 from ..values import choose_option
 from . import INDENT
 from .picture import PictureView
@@ -23,7 +23,7 @@ OUT, IN = "leave this out", "take all in"
 HELP = (
     "Click an image to go to it, × to leave it out, + to take it in again; all is then linearized "
     "anew. The bar is its classes at T and Ts as they stand. Point at a bar, a name or a yellow "
-    "word for more."
+    "word for more. Numbers count all images, those too that are left out."
 )
 
 
@@ -53,9 +53,9 @@ class OverviewView:
         self._lock = RLock()
         self._frame: Frame | None = None
         self._in_view = False
-        self._reviewer = Reviewer(whole, self._show, self._progress, tell)
-        self._view_id = clicks.see("overview", self._see)
-        self._strip_id = clicks.watch_parts("strip", self._choose)
+        self._reviewer = Reviewer(whole, self._show, tell)
+        self._view_id = clicks.watch_parts("overview", self._choose, self._see)
+        self._strip_id = clicks.watch_parts("strip", self._choose, lambda shown: None)
         self._often = gui.add_dropdown(
             "How often",
             OFTEN,
@@ -73,8 +73,6 @@ class OverviewView:
             hint="this: the image in the picture (key: K). all: those left out (key: Shift-K)",
         )
         self._told = gui.add_html("")
-        self._bar = gui.add_progress_bar(0, visible=False, animated=True)
-        self._cancel = gui.add_button("Cancel", visible=False, icon=viser.Icon.X)
         self._style = gui.add_html("")
         self._cards = gui.add_html("")
         self._listen(changed)
@@ -98,10 +96,6 @@ class OverviewView:
         @self._choices.on_click
         async def _(_: viser.GuiEvent) -> None:
             (self.leave_out if self._choices.value == OUT else self.take_all_in)()
-
-        @self._cancel.on_click
-        async def _(_: viser.GuiEvent) -> None:
-            self._reviewer.cancel()
 
     def read(self, state: ViewState) -> ViewState:
         """The state with what is counted as set here."""
@@ -134,13 +128,15 @@ class OverviewView:
         self._reviewer.close()
 
     def _choose(self, part: str, number: int) -> None:
-        """Do what a click on a card asks for; what is no card does nothing."""
+        """Do what a click on a card, or on cancel, asks for; what is neither does nothing."""
         if (frame := self._frame) is None or number >= len(self._whole.images):
             return
         if part == "toggle":
             self._exclude(number)
         elif part == "image" and number not in frame.excluded:
             self._picture.go(kept_images(frame, self._whole).index(number))
+        elif part == "cancel":
+            self._reviewer.cancel()
 
     def _see(self, shown: bool) -> None:
         with self._lock:
@@ -148,31 +144,22 @@ class OverviewView:
         self._reviewer.look_at(self._frame if shown else None)
         self._show()
 
-    def _progress(self, fraction: float | None) -> None:
-        running = fraction is not None
-        if running:
-            self._bar.value = round(100 * min(max(fraction, 0.04), 1))
-        for handle in (self._bar, self._cancel):
-            if handle.visible != running:
-                handle.visible = running
-
     def _show(self) -> None:
         with self._lock:
             frame, known = self._frame, self._reviewer
-            told, cards = "The images appear once there is a result.", ""
+            told, note, cards = "The images appear with the first picture.", "", ""
             if frame is not None and self._in_view:
                 order: Order = choose_option(self._order.value, ORDERS, ORDERS[0])
                 dealt = deal_cards(
                     self._whole.names, frame.excluded, known.shares, known.health, order
                 )
                 now = kept_images(frame, self._whole)[frame.state.image]
-                told = f"{summarize_strip(dealt)} {self._tell_status(frame)}"
-                cards = draw_strip(dealt, now, known.sheet, self._strip_id)
+                told, note = summarize_strip(dealt), self._tell_status(frame)
+                cards = draw_strip(dealt, now, known.sheet, frame.state.gain, self._strip_id)
             elif frame is not None:
                 return
-            self._told.content = (
-                f'<div id="{self._view_id}" style="{INDENT};font-size:0.85em">{escape(told)}</div>'
-            )
+            status = draw_status(told, note, known.fraction)
+            self._told.content = f'<div id="{self._view_id}" style="{INDENT}">{status}</div>'
             style = style_strip(known.sheet)
             if self._style.content != style:
                 self._style.content = style
@@ -181,7 +168,7 @@ class OverviewView:
 
     def _tell_status(self, frame: Frame) -> str:
         if reviewed_of(frame) is None:
-            return "There is no result of these images yet."
-        if not self._reviewer.is_reviewed(frame):
-            return "What is wrong with them is of an earlier result, or not known yet."
-        return ""
+            return "They are not linearized yet."
+        if self._reviewer.is_declined(frame):
+            return "Not all were looked at; open this tab again for that."
+        return "" if self._reviewer.is_reviewed(frame) else "Looking at each of them."
