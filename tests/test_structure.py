@@ -22,7 +22,7 @@ FLOORS = (
     ("robust", "label", "shadow_level", "thresholds"),
     ("linearize", "follow"),
     ("near_light", "dimensions", "confidence"),
-    ("landscape", "overview"),
+    ("landscape", "overview", "candidates"),
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),

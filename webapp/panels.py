@@ -14,6 +14,7 @@ from .clicks import Clicks
 from .frame import Frame
 from .saved import Saved
 from .state import Pixel, ViewState
+from .views.cloud import CloudView
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
@@ -83,7 +84,8 @@ class Panels:
             whole: `stack` with the images that are left out.
             state: whose method and thresholds are set at first.
         """
-        gui, changed, clicks = client.gui, actions.changed, Clicks(client)
+        gui, changed = client.gui, actions.changed
+        self.clicks = clicks = Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
@@ -110,6 +112,8 @@ class Panels:
             )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
+        with tabs.add_tab("Lights", viser.Icon.BULB):
+            self.cloud = CloudView(gui, clicks, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
             self.compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
@@ -124,7 +128,7 @@ class Panels:
         self._readers = (self.run, *both, self.legend, self.compare, self.shape, self.overview)
         self._drawers = (
             *(*both, self.samples, self.landscape, shares, summary),
-            *(self.diagnosis, self.compare, self.shape, self.overview),
+            *(self.diagnosis, self.cloud, self.compare, self.shape, self.overview),
         )
         self._keys = self._bind(actions)
 
@@ -132,6 +136,7 @@ class Panels:
         """Stop what panels compute."""
         self.landscape.close()
         self.overview.close()
+        self.cloud.close()
 
     def read(self, state: ViewState) -> ViewState:
         """The state with all that widgets stand for."""

@@ -27,7 +27,6 @@ from .panels import Actions, Panels
 from .pointing import Pointing
 from .saved import Saved
 from .selections import Selections
-from .start import start_from
 from .state import SURFACE, Pixel, ViewState
 from .work import Desk
 
@@ -40,23 +39,34 @@ PATIENCE = 0.25
 class Session:
     """The widgets, the state and the worker of one tab."""
 
-    def __init__(self, client: viser.ClientHandle, selections: Selections, keeper: Keeper) -> None:
-        """Build the tab, as it was kept, and start to work for it."""
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        selections: Selections,
+        keeper: Keeper,
+        start: Saved,
+        *,
+        again: bool,
+    ) -> None:
+        """Build the tab and start to work for it.
+
+        Args:
+            start: what it shows at first.
+            again: whether somebody has chosen that, so that no thresholds are suggested.
+        """
         self._client, self._source, self._keeper = client, selections.source, keeper
         self._wake, self._closed = Event(), Event()
         self.notices = Notices(client, self._closed)
         self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
-        kept = keeper.latest
-        start = start_from(self._source, kept)
         self._excluded = start.exclusions
         self._saved: Saved | None = None
-        first = start.state.thresholds if kept is None else None
+        first = None if again else start.state.thresholds
         self._bench = Bench(selections, self._excluded, first, self._desk())
         self._changed = monotonic()
         self._pointing = Pointing(self._wake.set)
         self._build(start.state)
-        if kept is not None:
+        if again:
             self._pointing.restore(start.state)
             self._panels.restore(start)
         self._wake.set()

@@ -225,7 +225,7 @@ def follow_slider(
     def move() -> bytes:
         T = 0.01 * 1.1 ** (next(steps) % 24)
         state = ViewState(T=round(T, 4), Ts=near.thresholds.Ts)
-        frame = compose(stack, {"robust": near}, state, live.follow(state, near, window, idle))
+        frame = compose(runs, {"robust": near}, state, live.follow(state, near, window, idle))
         assert frame.labels is not None
         assert frame.preview is not None
         return encode_labels(frame.labels)
