@@ -20,7 +20,7 @@ FLOORS = (
     ("load", "synthetic", "command"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine", "saturation"),
     ("robust", "label", "shadow_level", "thresholds"),
-    ("linearize", "follow"),
+    ("linearize", "follow", "residuals"),
     ("near_light", "dimensions", "confidence"),
     ("landscape", "overview", "candidates"),
     ("shape", "oracle", "evaluate", "paper"),

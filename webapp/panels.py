@@ -49,8 +49,6 @@ class Actions:
     """Send files of a kind, of all images or of the one shown."""
     recover: Callable[[], None]
     """Recover the shape."""
-    resample: Callable[[], None]
-    """Draw the samples again."""
     pin: Callable[[], None]
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
@@ -105,7 +103,9 @@ class Panels:
             )
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self.thresholds.add_steps(gui)
-            self.samples = SamplesView(gui, clicks, stack, actions.resample, self.thresholds.set_Ts)
+            setters = (self.thresholds.set_T, self.thresholds.set_Ts)
+            self.samples = SamplesView(gui, clicks, canvas, changed, *setters)
+            canvas.on_box(self.samples.take_box)
         with tabs.add_tab("Map", viser.Icon.MAP):
             self.landscape = LandscapeView(
                 gui, clicks, self.thresholds.set, actions.tell, known=known
@@ -155,13 +155,17 @@ class Panels:
         for view in self._drawers:
             view.draw(frame)
 
+    def redraw(self) -> None:
+        """Show what changed in panels without a change of the state."""
+        self.samples.redraw()
+
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""
-        return self.shape.take(pixel) or self.samples.take(pixel)
+        return self.samples.take(pixel) or self.shape.take(pixel)
 
     def marks(self) -> tuple[tuple[int, int, str], ...]:
         """(row, column, text) of what was clicked for panels."""
-        return (*self.shape.marks, *self.samples.marks)
+        return self.shape.marks
 
     def press(self, key: str) -> None:
         """Do what a key stands for, if anything."""
@@ -198,5 +202,5 @@ class Panels:
             "c": actions.copy,
             "n": actions.recover,
             "d": self.shape.toggle,
-            "escape": actions.stop,
+            "escape": lambda: (actions.stop(), self.samples.stop()),
         }

@@ -150,7 +150,6 @@ class Session:
             recover=self._recover,
             exclude=self._exclude,
             copy=self._copy,
-            resample=self._resample,
             pin=self._pointing.pin,
             unpin=self._pointing.unpin,
             tell=self.notices.tell,
@@ -192,11 +191,6 @@ class Session:
         else:
             self._canvas.copy(command)
             self.notices.say("Copied", command)
-
-    def _resample(self) -> None:
-        if self._frame is not None:
-            self._panels.samples.draw(self._frame)
-        self._wake.set()
 
     # --- drawing ---
 
@@ -244,6 +238,7 @@ class Session:
             self._panels.draw(frame)
         else:
             rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
+            self._panels.redraw()
         behind = bench.catch_up.pursue(state, results.get(state.method), rested)
         return self._keep(state, rested) or behind or rough or moving
 

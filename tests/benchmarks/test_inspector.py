@@ -212,8 +212,9 @@ def test_memory_stays_after_200_tabs_and_ten_minutes_of_use(benchmark: Benchmark
             for method in METHODS:
                 session._panels.run._method.value = method
                 session._wake.set()
-                wait_until(lambda m=method: m in session._bench.work.results, 60)
-            used = use(session, 60 * MINUTES / 5, 1)
+                bench = session._bench
+                wait_until(lambda m=method, b=bench: m in b.work.results, 60)
+            use(session, 60 * MINUTES / 5, 1)
         for _ in range(TABS // 10):
             with open_tab(app) as session:
                 wait_until(lambda s=session: s._frame is not None)
@@ -224,7 +225,7 @@ def test_memory_stays_after_200_tabs_and_ten_minutes_of_use(benchmark: Benchmark
         tabs = resident()
         with open_tab(app) as session:
             used = use(session, 60 * MINUTES, 2)
-        del session
+        del session, bench
         after = resident()
     finally:
         app.stop()

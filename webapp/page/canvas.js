@@ -6,6 +6,7 @@ window.openCanvas = (options) => {
 
   const NEAREST = 1003; // three.js NearestFilter
   const POST_MS = 50, VIEW_MS = 150;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
 
   const { rows, columns, planes, viewId } = options;
   const viewer = window.__viserMutable;
@@ -42,12 +43,13 @@ window.openCanvas = (options) => {
     viewer.requestRender();
   }
 
-  const page = { ...options, viewer, layer, listen, send, sender, peek };
+  const page = { ...options, viewer, layer, listen, send, sender, peek, CLICK_PIXELS };
   const camera = openCamera(page);
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
-  openInput({ ...page, camera });
+  const band = openBand({ ...page, camera });
+  openInput({ ...page, camera, band });
 
   // --- before each frame ---
 
@@ -70,6 +72,7 @@ window.openCanvas = (options) => {
         }
       }),
     );
+    band.draw();
     marks.draw();
     tellView();
   }
@@ -129,6 +132,7 @@ window.openCanvas = (options) => {
 
   function close() {
     closing.abort();
+    band.setSampling(null);
     clearTimeout(viewTimer);
     layer.remove();
     style.remove();
@@ -143,6 +147,8 @@ window.openCanvas = (options) => {
     setMarks: marks.setMarks,
     setLight: light.setLight,
     setReadout: marks.setReadout,
+    setSampling: band.setSampling,
+    setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };
