@@ -169,11 +169,11 @@ def test_how_often_is_chosen_here_shown_on_the_picture_and_kept(page: Any, app: 
     counts = count_classes(RESULT.labels, Factor.ATTACHED, Factor.CAST)
     wait_for_colours(page, render_often(counts, STACK.mask).astype(int), tolerance=1)
     caption = f"any shadow in 0 ... {counts.max()} of 12 images"
-    wait_until(lambda: caption in session._painter._legend)
+    wait_until(lambda: caption in session._painter._first.legend)
     toggle(page, 5)
     found = result_without(session, 5)
     counts = count_classes(found.labels, *CLASSES["any shadow"])
-    wait_until(lambda: "of 11 images" in session._painter._legend)
+    wait_until(lambda: "of 11 images" in session._painter._first.legend)
     wait_for_colours(page, render_often(counts, STACK.mask).astype(int), tolerance=1)
     page.get_by_text("back to input", exact=True).click()
     wait_until(lambda: session._read().layer == "input")
