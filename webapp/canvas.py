@@ -18,6 +18,8 @@ import viser
 
 from photolin.shape.recover import Shape
 
+from .hint import HINT
+from .keys import KEYS
 from .relief import MESH, Relief
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
@@ -79,6 +81,8 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "keys": [(key.shown, key.does) for key in KEYS],
+            "hint": HINT,
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -168,8 +172,8 @@ class Canvas:
     def on_key(self, callback: Callable[[str], None]) -> None:
         """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
 
-        F (fit), G (1:1) and the space bar (held: no overlay) act in the page and are not reported,
-        nor are keys with Ctrl, Alt or Meta, nor arrows on a focused slider.
+        Keys that act in the page (`Key.in_page`) are not reported, nor are keys with Ctrl, Alt or
+        Meta, arrows on a focused slider, and the Escape that closes the list of keys.
         """
 
         @self._key.on_update

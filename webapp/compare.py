@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.factors import OUTSIDE, PALETTE, Factor
-
 from .frame import Frame
-from .render import alpha_of
+from .patterns import add_marks
+from .render import tabulate_colours
 from .state import Layer
 
 Picture = NDArray[np.uint8]
@@ -33,11 +32,9 @@ def lay_over(picture: Picture, frame: Frame, hidden: bool) -> Picture:
     if labels is None or hidden:
         return rgb
     solid = state.layer == "labels"
-    alphas, colours = np.zeros(256, np.float32), np.zeros((256, 3), np.float32)
-    for factor in state.shown:
-        alphas[factor] = 1 if solid else alpha_of(Factor(factor), state.opacity)
-        colours[factor] = PALETTE[factor]
-    alphas[OUTSIDE] = 0
+    colours, alphas = tabulate_colours(state.shown, state.opacity, solid=solid)
+    if state.patterns:
+        labels = add_marks(labels)
     a = alphas[labels][:, :, None]
     return (rgb * (1 - a) + colours[labels] * a + 0.5).astype(np.uint8)
 

@@ -104,7 +104,7 @@ class Painter:
         state = frame.state
         solid = state.layer == "labels"
         hidden = hides_labels(frame) or state.against is not None
-        look = (state.shown, state.opacity, state.outlines, solid, hidden)
+        look = (state.shown, state.opacity, state.outlines, state.patterns, solid, hidden)
         if not self._is_new(
             "overlay", state.image, state.thresholds, frame.analysis, frame.preview, look
         ):
@@ -112,7 +112,12 @@ class Painter:
         overlay = None
         if frame.labels is not None and not hidden:
             overlay = encode_labels(
-                frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
+                frame.labels,
+                state.shown,
+                state.opacity,
+                outlines=state.outlines,
+                solid=solid,
+                patterns=state.patterns,
             )
         self._canvas.set_overlay(overlay)
 
@@ -143,7 +148,16 @@ def compared_with(frame: Frame) -> tuple[object, ...] | None:
     s = frame.state
     if s.against is None:
         return None
-    how = (s.against, s.divider, s.difference, s.shown, s.opacity, s.thresholds, s.light)
+    how = (
+        s.against,
+        s.divider,
+        s.difference,
+        s.shown,
+        s.opacity,
+        s.patterns,
+        s.thresholds,
+        s.light,
+    )
     return (*how, frame.analysis, frame.beside, frame.preview, frame.shape)
 
 

@@ -26,6 +26,7 @@ from .painter import Painter
 from .panels import Actions, Panels
 from .runs import Runs
 from .state import MOST_PINS, SURFACE, Pixel, ViewState
+from .theme import set_theme
 from .work import Desk, Work
 
 REST = 0.3
@@ -73,9 +74,7 @@ class Session:
     def _build(self, client: viser.ClientHandle) -> None:
         _, H, W = self._stack.shape
         gui = client.gui
-        gui.configure_theme(
-            control_width="large", show_logo=False, show_share_button=False, dark_mode=True
-        )
+        set_theme(gui, ViewState.theme)
         gui.main_panel.dock_right()
         self._canvas = canvas = Canvas(client, H, W)
         self._painter = Painter(canvas)

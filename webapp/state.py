@@ -13,6 +13,8 @@ SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 """Layers that are there once a shape is."""
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
+Theme = Literal["dark", "light"]
+THEMES: tuple[Theme, ...] = get_args(Theme)
 
 Pixel = tuple[int, int]
 """(row, column)"""
@@ -43,6 +45,10 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
+    patterns: bool = False
+    """Mark the classes by patterns too, for eyes that do not tell their colours apart."""
+    theme: Theme = "dark"
+    """What everything is shown on."""
     against: Layer | None = None
     """The layer, by the method beside where one is, that the picture is compared with."""
     divider: float = 0.5
@@ -76,6 +82,8 @@ class ViewState:
             raise OptionError(f"beside is {self.beside!r}; accepted are {', '.join(METHODS)}")
         if self.encoding not in ENCODINGS:
             raise OptionError(f"encoding is {self.encoding!r}; accepted are {'; '.join(ENCODINGS)}")
+        if self.theme not in THEMES:
+            raise OptionError(f"theme is {self.theme!r}; accepted are {', '.join(THEMES)}")
         if not self.light[0] ** 2 + self.light[1] ** 2 < 1:
             raise OptionError(
                 f"light is {self.light}; accepted are x and y of a direction towards the camera's "

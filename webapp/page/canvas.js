@@ -47,7 +47,7 @@ window.openCanvas = (options) => {
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
-  openInput({ ...page, camera });
+  openInput({ ...page, camera, cards: openCards(page) });
 
   // --- before each frame ---
 
@@ -96,9 +96,22 @@ window.openCanvas = (options) => {
 
   // --- settings of the page ---
 
-  // The panel's scroll bar lies over the right end of its boxes and buttons.
+  // The panel's scroll bar lies over the right end of its boxes and buttons. Boxes of sliders have no
+  // room for four decimals. Tooltips lie over the row above, which may be the next one to click, and
+  // take its clicks: where the picture is wide enough, they go beside the panel instead.
   const style = document.head.appendChild(document.createElement("style"));
-  style.textContent = ".mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}";
+  style.textContent = `
+    .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
+    .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
+    .mantine-Tooltip-tooltip{pointer-events:none}
+    @media (min-width:640px) {
+      .mantine-Tooltip-tooltip[data-multiline]{
+        left:calc(var(--photolin-canvas-width) - 15rem - 10px)!important}
+      .mantine-Tooltip-tooltip[data-multiline] .mantine-Tooltip-arrow{display:none}
+    }`;
+  const measure = new ResizeObserver(() =>
+    document.documentElement.style.setProperty("--photolin-canvas-width", `${canvas.clientWidth}px`));
+  measure.observe(canvas);
 
   // viser lowers the resolution on slow machines, which blurs pixels.
   const fixResolution = () =>
@@ -130,6 +143,7 @@ window.openCanvas = (options) => {
   function close() {
     closing.abort();
     clearTimeout(viewTimer);
+    measure.disconnect();
     layer.remove();
     style.remove();
     scene.onBeforeRender = () => {};

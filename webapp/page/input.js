@@ -1,6 +1,6 @@
 // Pointer and keys: which pixel is meant, and who gets a key, the picture or a widget.
 
-function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, keyId, send, sender, peek }) {
+function openInput({ viewer, listen, rows, columns, camera, cards, hoverId, pickId, keyId, send, sender, peek }) {
   const CLICK_PIXELS = 3; // a pointer that moves farther drags
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
@@ -61,10 +61,14 @@ function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, key
     if (focused && !isBusy(focused)) focused.blur(); // Tab still goes on from there
   }
 
-  const local = { f: camera.fit, g: camera.oneToOne, " ": () => peek(true) };
+  const local = {
+    f: camera.fit, g: camera.oneToOne, " ": () => peek(true),
+    h: cards.toggleHint, "?": cards.toggleKeys,
+  };
 
   function onKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
+    if (event.key === "Escape" && cards.closeKeys()) return;
     const action = local[event.key.toLowerCase()];
     const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
     if (!action && !reported) return;

@@ -2,6 +2,8 @@
 
 import viser
 
+from ..keys import tabulate_keys
+
 TEXT = """
 Every pixel of every image is labelled **D** diffuse, **S** specular, **A** attached shadow
 (the surface faces away from the light), **C** cast shadow (something blocks the light) or **U**
@@ -20,33 +22,14 @@ gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and 
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 
-| key | does |
-|---|---|
-| ← → | previous, next image |
-| ↑ ↓ | view: input, linearized, residual, labels, and those of a shape |
-| [ ] | T down, up |
-| { } | Ts down, up |
-| S | suggest T and Ts |
-| R | linearize again with T and Ts |
-| Z, Shift-Z | undo, redo a change of T or Ts |
-| M | next method |
-| P | pin the selected pixel to compare with |
-| X, U | next image where it is specular, undefined |
-| B | compare: all of one picture, all of the other |
-| 1 … 5 | show or hide D, S, A, C, U |
-| space held | without overlay |
-| N | recover the shape, as the tab Shape says |
-| D | 3D, flat again |
-| F, G | fit, one image pixel on one screen pixel |
-| E | export as chosen |
-| Esc | cancel what is running |
+{keys}
 
 Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. In 3D left-drag
 turns, right-drag moves, the wheel zooms, a click selects the pixel, F and a double click look from
 the front again.
 Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in
 space x is right, y up, z to the camera.
-"""
+""".replace("{keys}", tabulate_keys())
 
 
 class HelpView:
