@@ -9,7 +9,7 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 
 import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -137,6 +137,14 @@ class Canvas:
     def one_to_one(self) -> None:
         """Show each image pixel as one pixel of the screen (1 / devicePixelRatio CSS pixels)."""
         call_javascript(self._client, "window.photolin.oneToOne")
+
+    def set_reach(self, slider: viser.GuiSliderHandle[float], most: float) -> None:
+        """Let numbers up to `most` be typed beside a slider that ends earlier."""
+        call_javascript(self._client, "window.photolin.setReach", widget_id(slider), most)
+
+    def set_titles(self, titles: Mapping[str, str]) -> None:
+        """Give buttons, by their names in the page, tooltips."""
+        call_javascript(self._client, "window.photolin.setTitles", list(titles.items()))
 
     def on_pick(self, callback: Callable[[Pixel], None]) -> None:
         """Call back with the pixel that was clicked; clicks beside the picture do nothing."""

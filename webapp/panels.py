@@ -28,6 +28,7 @@ from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
 from .views.thresholds import ThresholdView
+from .viser_internals import button_hints
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,9 @@ class Panels:
             *(self.diagnosis, self.compare, self.shape),
         )
         self._keys = self._bind(actions)
+        for slider, most in self.thresholds.typed:
+            canvas.set_reach(slider, most)
+        canvas.set_titles(button_hints(client))
 
     def close(self) -> None:
         """Stop what panels compute."""

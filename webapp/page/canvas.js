@@ -47,6 +47,7 @@ window.openCanvas = (options) => {
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
+  const widgets = openWidgets(page);
   openInput({ ...page, camera, cards: openCards(page) });
 
   // --- before each frame ---
@@ -103,7 +104,7 @@ window.openCanvas = (options) => {
   style.textContent = `
     .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
     .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
-    .mantine-Tooltip-tooltip{pointer-events:none}
+    .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
     @media (min-width:640px) {
       .mantine-Tooltip-tooltip[data-multiline]{
         left:calc(var(--photolin-canvas-width) - 15rem - 10px)!important}
@@ -157,6 +158,8 @@ window.openCanvas = (options) => {
     setMarks: marks.setMarks,
     setLight: light.setLight,
     setReadout: marks.setReadout,
+    setReach: widgets.setReach,
+    setTitles: widgets.setTitles,
     close,
   };
 };

@@ -33,7 +33,9 @@ class RunView:
         )
         self._stage = gui.add_html("", visible=False)
         self._bar = gui.add_progress_bar(0, visible=False, animated=True)
-        self._cancel = gui.add_button("Cancel", visible=False, icon=viser.Icon.X)
+        self._cancel = gui.add_button(
+            "Cancel", visible=False, icon=viser.Icon.X, hint="Stop what is running (key: Esc)"
+        )
 
         @self._method.on_update
         async def _(_: viser.GuiEvent) -> None:
