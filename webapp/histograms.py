@@ -54,9 +54,10 @@ def plot_histogram(
         'stroke="currentColor" stroke-opacity="0.5"/>'
     )
     for value in ticks(0, top):
+        x = LEFT + value / top * wide
+        anchor = "middle" if x < WIDTH - 2 * LEFT else "end"  # else it would be cut off
         parts.append(
-            f'<text x="{LEFT + value / top * wide:.2f}" y="{TOP + high + 12}" '
-            f'text-anchor="middle">{value:g}</text>'
+            f'<text x="{x:.2f}" y="{TOP + high + 12}" text-anchor="{anchor}">{value:g}</text>'
         )
     parts.append(
         f'<text x="{WIDTH / 2:g}" y="{HEIGHT - 4}" text-anchor="middle">{escape(axis)}</text>'

@@ -24,7 +24,7 @@ Quantity = Literal[
 ]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
-SIDE, LEFT, TOP, RIGHT, BOTTOM = 200, 54, 12, 58, 38
+SIDE, LEFT, TOP, RIGHT, BOTTOM = 200, 60, 12, 58, 38
 """Width and height of the map, and what is around it, in the units of the drawing."""
 BAR = 10
 """Width of the legend's colours."""

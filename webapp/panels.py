@@ -98,8 +98,9 @@ class Panels:
             self.compare = CompareView(gui, changed)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self.shape = ShapeView(gui, stack, changed, actions.recover)
+            self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
-            self.export = ExportView(gui, actions.download)
+            self.export = ExportView(gui, actions.download, self.run.add_progress)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)

@@ -18,6 +18,9 @@ ZERO = 128
 OPACITY = 0.55
 DIFFUSE_OPACITY = 0.15
 """Opacity of diffuse at the default: it is everywhere, and the eye should go to the rest."""
+SPECULAR_OPACITY = 0.75
+"""Of specular at the default: on dark pixels it would else look as undefined does, both being a
+brown; brighter, it is told apart by all eyes."""
 
 
 def choose_gain(images: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
@@ -98,7 +101,7 @@ def encode_labels(
     Args:
         labels: (H,W) Factor codes; OUTSIDE and every other code is transparent.
         shown: classes drawn; the others are transparent.
-        opacity: 0 to 1; diffuse is fainter, except at 0 and 1.
+        opacity: 0 to 1; diffuse is fainter and specular stronger, except at 0 and 1.
         outlines: draw the one-pixel borders of the classes, opaque, diffuse left out.
         solid: draw every shown class opaque (the label map alone).
         patterns: mark the classes by patterns, unless outlines are drawn.
@@ -156,10 +159,9 @@ def _percentile(values: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
 
 
 def alpha_of(factor: Factor, opacity: float) -> float:
-    """Of a class; diffuse follows a power of the opacity: 0 and 1 stay, 55 % becomes 15 %."""
-    if factor is not Factor.DIFFUSE:
-        return opacity
-    return float(opacity ** (np.log(DIFFUSE_OPACITY) / np.log(OPACITY)))
+    """Of a class; some follow a power of the opacity: 0 and 1 stay, 55 % becomes theirs."""
+    own = {Factor.DIFFUSE: DIFFUSE_OPACITY, Factor.SPECULAR: SPECULAR_OPACITY}
+    return float(opacity ** (np.log(own.get(factor, OPACITY)) / np.log(OPACITY)))
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

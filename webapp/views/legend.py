@@ -36,7 +36,7 @@ class LegendView:
             0.05,
             0.55,
             marks=(),
-            hint="Of the overlay, 0 to 1; diffuse is drawn fainter",
+            hint="Of the overlay, 0 to 1; diffuse is drawn fainter, specular stronger",
         )
         self._outlines = gui.add_checkbox(
             "outlines",
