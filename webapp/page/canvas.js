@@ -99,12 +99,14 @@ window.openCanvas = (options) => {
 
   // The panel's scroll bar lies over the right end of its boxes and buttons. Boxes of sliders have no
   // room for four decimals. Tooltips lie over the row above, which may be the next one to click, and
-  // take its clicks: where the picture is wide enough, they go beside the panel instead.
+  // take its clicks: where the picture is wide enough, they go beside the panel instead. In a window
+  // of 4K without scaling, viser's letters are tiny.
   const style = document.head.appendChild(document.createElement("style"));
   style.textContent = `
     .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
     .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
     .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
+    @media (min-width:3000px) { html{font-size:17px!important} }
     @media (min-width:640px) {
       .mantine-Tooltip-tooltip[data-multiline]{
         left:calc(var(--photolin-canvas-width) - 15rem - 10px)!important}

@@ -4,11 +4,11 @@
 function openCards({ layer, keys, hint }) {
   const DISMISSED = "photolin-hint-dismissed"; // in the browser's storage of this address
   const CARD =
-    "color:var(--mantine-color-text);background:var(--mantine-color-body);opacity:.94;" +
+    "color:var(--mantine-color-text);background:var(--mantine-color-body);opacity:.96;" +
     "border:1px solid var(--mantine-color-default-border);border-radius:6px;" +
-    "box-shadow:0 2px 8px #0006;font:13px/1.45 system-ui,sans-serif;box-sizing:border-box;";
+    "box-shadow:0 2px 8px #0006;font:.88rem/1.45 system-ui,sans-serif;box-sizing:border-box;";
   const KEY =
-    "white-space:nowrap;padding:0 .4em;border-radius:3px;font:600 12px/1.5 ui-monospace,monospace;" +
+    "white-space:nowrap;padding:0 .4em;border-radius:3px;font:600 .81rem/1.5 ui-monospace,monospace;" +
     "border:1px solid var(--mantine-color-default-border);justify-self:start;align-self:start";
 
   const add = (parent, tag, text, style, className = "") => {
@@ -19,10 +19,11 @@ function openCards({ layer, keys, hint }) {
     return element;
   };
 
-  // above the line of text in the lower left corner, also where that takes two lines
+  // above the line of text in the lower left corner, also where that takes two lines; viser's notes
+  // come in the upper left one
   const pile = add(layer, "div", "",
-    "position:absolute;z-index:1;inset:10px 10px 52px;display:flex;flex-direction:column;" +
-    "align-items:center;gap:8px;pointer-events:none");
+    "position:absolute;z-index:1;inset:10px 10px 52px;display:flex;" +
+    "flex-direction:column-reverse;align-items:center;gap:8px;pointer-events:none");
 
   function addClose(card, tip, close) {
     const button = add(card, "button", "×",
