@@ -35,7 +35,7 @@ def add_marks(labels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     must be to look the same when the picture is fitted into a window.
     """
     H, W = labels.shape
-    return labels + ((_bits(H, W) >> labels & 1) * np.uint8(MARK))
+    return labels + (_bits(H, W) >> labels & np.uint8(1)) * np.uint8(MARK)
 
 
 @functools.lru_cache(maxsize=2)
@@ -48,7 +48,9 @@ def _bits(H: int, W: int) -> NDArray[np.uint8]:
         Factor.CAST: column % 4 == 0,
         Factor.UNDEFINED: (row == column) | (row == (TILE - column) % TILE),
     }
-    tile = sum(marks[factor].astype(np.uint8) << factor for factor in marks).astype(np.uint8)
+    tile = np.zeros((TILE, TILE), np.uint8)
+    for factor, marked in marks.items():
+        tile[marked] |= 1 << factor
     width = max(1, round(max(H, W) / FINEST))
     tile = tile.repeat(width, axis=0).repeat(width, axis=1)
     side = len(tile)
