@@ -3,7 +3,6 @@
 Exit status: 0 done, 1 a fault of photolin, 2 something the user can mend, 130 stopped by Ctrl-C.
 """
 
-import functools
 import os
 import shlex
 import sys
@@ -29,12 +28,8 @@ from .export import (
     Contents,
     check_output,
     export_files,
-    is_result,
     load_result,
-    load_result_source,
-    load_result_stack,
     program_version,
-    result_files,
     save_result,
     write_files,
 )
@@ -42,6 +37,7 @@ from .load import LoadOptions
 from .pipeline import analyze
 from .verbs import COMMAND, bind, read_stack
 from .verbs.evaluate import evaluate
+from .verbs.inspect import inspect
 from .verbs.report import report
 from .verbs.scenes import info, synth
 from .verbs.shape import lights, measure_shape, shape
@@ -86,50 +82,6 @@ def run(
     )
     print(run_summary(result))
     print(f"written {out / 'result.npz'} and {out / 'report.json'}")
-
-
-def inspect(
-    path: Positional[Path],
-    analysis: Options = Options(),
-    reading: LoadOptions = LoadOptions(),
-    *,
-    stack: Path | None = None,
-    host: str = "127.0.0.1",
-    port: int = 8080,
-    no_browser: bool = False,
-) -> None:
-    """Look at a stack or a result in the browser.
-
-    A result brings its own analysis and reading options; those given apply to a stack.
-
-    Args:
-        path: What run accepts as stack, or a folder that run wrote.
-        stack: Where the images of a result are now, if they have moved.
-        host: Address to listen on; any but a loopback address asks visitors for a token.
-        port: Port to listen on, 1 to 65535.
-        no_browser: Print the address and do not open a browser.
-    """
-    result = load_result(path) if is_result(path) else None
-    with progress_bar() as progress:
-        if result is None:
-            images, _ = read_stack(path, reading, progress)
-        else:
-            images = load_result_stack(path, stack)
-            was, reading = load_result_source(path)
-            path = stack or was or path
-    from webapp.app import serve
-
-    serve(
-        images,
-        result,
-        options=result.options if result else analysis,
-        pack=functools.partial(
-            result_files, command=COMMAND.get(), stack_path=path, load_options=reading
-        ),
-        host=host,
-        port=port,
-        open_browser=not no_browser,
-    )
 
 
 def export(

@@ -31,6 +31,7 @@ from webapp.app import App
 from webapp.keys import KEYS
 from webapp.render import encode_labels, render_input
 from webapp.session import Session
+from webapp.source import Source
 from webapp.viser_internals import widget_id
 
 pytestmark = [
@@ -45,7 +46,7 @@ RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
 
 @pytest.fixture
 def app() -> Iterator[App]:
-    opened = App(STACK, RESULT, options=RESULT.options, port=0)
+    opened = App(Source(STACK, RESULT, RESULT.options), port=0)
     yield opened
     opened.stop()
 
@@ -100,7 +101,7 @@ def test_the_list_of_keys_holds_them_all_and_is_closed_by_its_key_by_escape_and_
     press(page, "?")
     keys.click(position={"x": 20, "y": 20})
     keys.wait_for(state="hidden")
-    assert session._pixel is None  # the click was for the list
+    assert session._pointing.pixel is None  # the click was for the list
     assert stopped == []
     press(page, "Escape")
     wait_until(lambda: stopped == [True])
@@ -114,7 +115,7 @@ def test_the_picture_is_in_use_around_the_list_of_keys(page: Any, app: App) -> N
     _, y = place_of(page, 2.5, 30.5)
     assert y < card["y"]
     click_pixel(page, 2, 30)
-    wait_until(lambda: session._pixel == (2, 30))
+    wait_until(lambda: session._pointing.pixel == (2, 30))
     press(page, "ArrowRight")
     wait_until(lambda: session._read().image == 1)
     assert page.locator(".photolin-keys").is_visible()
@@ -159,7 +160,7 @@ def test_the_hint_lets_clicks_through_and_leaves_the_readout_free(
         if place_of(page, row + 0.5, 32.5)[1] < hint.bounding_box()["y"] + 20
     )
     click_pixel(page, row, 32)  # under the hint
-    wait_until(lambda: session._pixel == (row, 32))
+    wait_until(lambda: session._pointing.pixel == (row, 32))
     wait_until(lambda: readout.inner_text().startswith("row "))
     assert not overlap(hint.bounding_box(), readout.bounding_box())
 
@@ -308,12 +309,14 @@ def test_an_export_shows_its_progress_beside_its_button_and_can_be_cancelled(
 
     def pack(*given: Any) -> tuple[str, bytes]:
         waiting.append(given)
-        while not session._work._job.stopping():
+        while not session._bench.work._job.stopping():
             time.sleep(0.02)
         return "late.zip", b"late"
 
     sent: list[str] = []
-    session._work._desk = replace(session._work._desk, send=lambda name, data: sent.append(name))
+    session._bench.work._desk = replace(
+        session._bench.work._desk, send=lambda name, data: sent.append(name)
+    )
     monkeypatch.setattr(work, "make_download", pack)
     page.get_by_role("tab", name="Export").click()
     page.get_by_role("button", name="Download").click()

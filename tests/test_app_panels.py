@@ -23,6 +23,7 @@ from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.frame import pixel_values
 from webapp.session import Session
+from webapp.source import Source
 
 pytestmark = [
     pytest.mark.browser,
@@ -36,7 +37,7 @@ RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
 
 @pytest.fixture
 def app() -> Iterator[App]:
-    opened = App(STACK, RESULT, options=RESULT.options, port=0)
+    opened = App(Source(STACK, RESULT, RESULT.options), port=0)
     yield opened
     opened.stop()
 
@@ -87,10 +88,10 @@ def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, 
     wait_until(lambda: session._read().thresholds == before)
     press(page, "Shift+Z")
     wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    assert session._pixel is None  # these clicks select nothing
+    assert session._pointing.pixel is None  # these clicks select nothing
     push(page, "stop")
     click_pixel(page, 20, 30)
-    wait_until(lambda: session._pixel == (20, 30))
+    wait_until(lambda: session._pointing.pixel == (20, 30))
 
 
 def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any, app: App) -> None:
@@ -120,10 +121,11 @@ def test_a_pixel_is_told_in_all_images_beside_pinned_ones(page: Any, app: App) -
     specular = np.argwhere((RESULT.labels[1:] == Factor.SPECULAR).any(axis=0))
     row, column = specular[len(specular) // 2].tolist()
     click_pixel(page, 20, 30)
-    wait_until(lambda: session._pixel == (20, 30))
+    wait_until(lambda: session._pointing.pixel == (20, 30))
     press(page, "p")
     click_pixel(page, row, column)
-    wait_until(lambda: session._read().pins == ((20, 30),) and session._pixel == (row, column))
+    now = session._pointing
+    wait_until(lambda: now.pins == ((20, 30),) and now.pixel == (row, column))
     page.get_by_text(f"row {row}, column {column} (line)").wait_for()
     page.get_by_text("row 20, column 30 (dashes)").wait_for()
     assert page.locator("table tr:visible").count() == 9

@@ -30,6 +30,7 @@ from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.session import Session
+from webapp.source import Source
 from webapp.surface import render_surface
 from webapp.work import Recovered
 
@@ -68,7 +69,7 @@ def open_app() -> Iterator[OpenApp]:
     apps: list[App] = []
 
     def open_one(stack: ImageStack = STACK, result: Analysis | None = RESULT) -> App:
-        apps.append(App(stack, result, options=OPTIONS, port=0))
+        apps.append(App(Source(stack, result, OPTIONS), port=0))
         return apps[-1]
 
     yield open_one
@@ -115,7 +116,7 @@ def click_all(page: Any, session: Session, pixels: tuple[tuple[int, int], ...]) 
 def recovered(session: Session) -> Recovered:
     """The shape, once it is on screen."""
     wait_until(lambda: session._frame is not None and session._frame.shape is not None, 30)
-    found = session._work.recovered
+    found = session._bench.work.recovered
     assert found is not None
     return found
 
@@ -224,7 +225,7 @@ def test_three_clicks_on_the_rim_and_five_on_the_sphere_give_its_shape(
     wait_until(lambda: session._panels.shape._numbers[2].value == pytest.approx(RADIUS, abs=1))
     push(page, "points")
     click_all(page, session, FIVE[:4])
-    assert session._work.recovered is None
+    assert session._bench.work.recovered is None
     click_all(page, session, FIVE[4:])
     shape = recovered(session).shape
     assert session._read().layer == "relit"
@@ -252,10 +253,10 @@ def test_a_click_on_the_surface_selects_the_pixel_that_is_seen_there(
         if any(drag):
             turn(page, *drag)
         for pixel in ((60, 80), (45, 80), (66, 73), (52, 90)):
-            session._pixel = None
+            session._pointing.pixel = None
             page.mouse.click(*on_screen(page, depth, pixel))
-            wait_until(lambda: session._pixel is not None)
-            met = session._pixel
+            wait_until(lambda: session._pointing.pixel is not None)
+            met = session._pointing.pixel
             assert met is not None
             off = np.abs(np.subtract(met, pixel)).max()
             worst = max(worst, off)
@@ -265,7 +266,7 @@ def test_a_click_on_the_surface_selects_the_pixel_that_is_seen_there(
             page.wait_for_timeout(350)  # the next click is none of a double click
     print(f"clicks are off by at most {worst} pixels")
     page.mouse.click(300, 5)
-    assert session._pixel is not None
+    assert session._pointing.pixel is not None
 
 
 def test_each_pixel_of_the_picture_lies_on_its_point_of_the_surface(
@@ -296,7 +297,7 @@ def test_what_the_surface_hides_is_not_marked(page: Any, open_app: OpenApp) -> N
     session = enter(page, open_app())
     recover(page, session)
     click_pixel(page, 60, 40)
-    wait_until(lambda: session._pixel == (60, 40))
+    wait_until(lambda: session._pointing.pixel == (60, 40))
     turn_on(page)
     page.wait_for_selector(".photolin-marker:not([hidden])")
     turn(page, -150, 0)
@@ -308,7 +309,7 @@ def test_what_the_surface_hides_is_not_marked(page: Any, open_app: OpenApp) -> N
 def test_the_flat_picture_is_as_before_after_3d(page: Any, open_app: OpenApp) -> None:
     session = enter(page, open_app())
     found = recover(page, session)
-    expected = render_surface(found.shape, "relit", session._light, STACK.mask)[0]
+    expected = render_surface(found.shape, "relit", session._pointing.light, STACK.mask)[0]
     expected = np.repeat(expected[..., None], 3, axis=2)
     page.add_style_tag(content=".photolin-light { visibility: hidden }")
     wait_for_colours(page, expected)
@@ -324,7 +325,7 @@ def test_the_flat_picture_is_as_before_after_3d(page: Any, open_app: OpenApp) ->
     assert similarity(page) == pytest.approx(view, abs=1e-6)
     wait_for_colours(page, expected)
     click_pixel(page, 30, 100)
-    wait_until(lambda: session._pixel == (30, 100))
+    wait_until(lambda: session._pointing.pixel == (30, 100))
     before = camera_rotation(page)
     turn(page, 60, 20)
     assert camera_rotation(page) == pytest.approx(before, abs=1e-9)
@@ -405,13 +406,13 @@ def test_dragging_the_light_shows_the_scene_under_it(page: Any, open_app: OpenAp
             box["x"] + box["width"] * (1 + x) / 2, box["y"] + box["height"] * (1 - y) / 2, steps=5
         )
     page.mouse.up()
-    wait_until(lambda: session._light == pytest.approx((0.55, -0.35), abs=0.02))
-    expected, caption = render_surface(found.shape, "relit", session._light, STACK.mask)
+    wait_until(lambda: session._pointing.light == pytest.approx((0.55, -0.35), abs=0.02))
+    expected, caption = render_surface(found.shape, "relit", session._pointing.light, STACK.mask)
     page.add_style_tag(content=".photolin-light { visibility: hidden }")
     wait_for_colours(page, np.repeat(expected[..., None], 3, axis=2))
     page.mouse.move(300, 2)
     wait_for_text(page, caption)
-    assert session._pixel is None  # the ball is not the picture
+    assert session._pointing.pixel is None  # the ball is not the picture
     assert similarity(page) == view
 
 
@@ -424,7 +425,7 @@ def test_dragging_the_light_beyond_the_ball_stays_on_its_rim(page: Any, open_app
     page.mouse.down()
     page.mouse.move(box["x"] - 300, box["y"] + 55, steps=5)
     page.mouse.up()
-    wait_until(lambda: session._light == pytest.approx((-0.99, 0), abs=0.01))
+    wait_until(lambda: session._pointing.light == pytest.approx((-0.99, 0), abs=0.01))
 
 
 def test_what_does_not_work_is_told_in_the_words_of_the_command_line(
@@ -438,15 +439,15 @@ def test_what_does_not_work_is_told_in_the_words_of_the_command_line(
     click_all(page, session, ((60, 60), (60, 70), (60, 80), (60, 90), (60, 100)))
     wait_for_text(page, "This did not work")
     wait_for_text(page, "lie nearly in one plane")
-    assert session._work.recovered is None
-    wait_until(lambda: not session._work._job._running)
+    assert session._bench.work.recovered is None
+    wait_until(lambda: not session._bench.work._job._running)
     click_pixel(page, 112, 2)  # where no note lies over the picture
     wait_for_text(page, "the point at row 112, column 2 is outside the sphere")
 
     push(page, "clear")
     push(page, "points")
     dismiss_notes(page)
-    wait_until(lambda: not session._work._job._running)
+    wait_until(lambda: not session._bench.work._job._running)
     click_all(page, session, FIVE)
     assert recovered(session).shape.resolved.residual < 2
 
@@ -459,8 +460,8 @@ def test_a_shape_of_other_thresholds_says_so_until_it_is_recovered_again(
     session._panels.thresholds._T.value = 0.08
     session._wake.set()
     wait_for_text(page, "This shape is of T 0.0500, Ts 0.0200; recover again")
-    wait_until(lambda: session._work.results["robust"].thresholds.T == 0.08)
-    wait_until(lambda: not session._work._job._running)
+    wait_until(lambda: session._bench.work.results["robust"].thresholds.T == 0.08)
+    wait_until(lambda: not session._bench.work._job._running)
     press(page, "n")
     wait_until(lambda: recovered(session).analysis.thresholds.T == 0.08, 30)
     page.get_by_text("This shape is of").wait_for(state="detached")

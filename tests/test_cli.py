@@ -24,6 +24,7 @@ from photolin.compiling import COMPILING
 from photolin.errors import Cancelled
 from photolin.export import load_result, load_result_stack
 from photolin.factors import Factor
+from webapp.source import Source
 
 ROOT = Path(__file__).parent.parent
 
@@ -109,8 +110,8 @@ def test_a_result_finds_its_stack_again(stack: Path, tmp_path: Path, monkeypatch
 def test_what_inspect_lets_download_finds_its_stack_again(
     stack: Path, tmp_path: Path, monkeypatch
 ) -> None:
-    served: list[dict] = []
-    monkeypatch.setattr("webapp.app.serve", lambda *of, **how: served.append(how | {"of": of}))
+    served: list[Source] = []
+    monkeypatch.setattr("webapp.app.serve", lambda source, **_: served.append(source))
     moved = tmp_path / "moved"
     shutil.copytree(stack, moved)
     roi = ["--roi", "4", "40", "8", "56"]
@@ -122,10 +123,10 @@ def test_what_inspect_lets_download_finds_its_stack_again(
         ([tmp_path / "out", "--stack", moved], moved),
     ):
         assert main(["inspect", *map(str, arguments)]) == 0
-        report = json.loads(served[-1]["pack"](result)["report.json"])
+        report = json.loads(served[-1].pack(result, ())["report.json"])
         assert report["stack"] == str(place)
         assert report["load"]["roi"] == [4, 40, 8, 56]
-        assert served[-1]["of"][0].images.shape == (8, 36, 48)
+        assert served[-1].stack.shape == (8, 36, 48)
 
 
 def test_a_result_refuses_images_that_changed(stack: Path, tmp_path: Path, capsys) -> None:

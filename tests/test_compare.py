@@ -9,6 +9,7 @@ from photolin import Options, analyze, render_scene
 from photolin.factors import PALETTE, Factor
 from webapp.compare import LINE, differ, lay_over, other_frame, split
 from webapp.frame import Frame, compose
+from webapp.runs import Runs
 from webapp.state import ViewState
 
 STACK = render_scene("sphere_cone", size=(24, 30), images=8).stack
@@ -16,10 +17,11 @@ RESULTS = {
     "robust": analyze(STACK),
     "classification": analyze(STACK, Options(method="classification", samples=50)),
 }
+RUNS = Runs(STACK, Options())
 
 
 def frame(**state: object) -> Frame:
-    return compose(STACK, RESULTS, replace(ViewState(), **state))  # type: ignore[arg-type]
+    return compose(RUNS, RESULTS, replace(ViewState(), **state))  # type: ignore[arg-type]
 
 
 def pictures() -> tuple[np.ndarray, np.ndarray]:

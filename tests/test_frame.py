@@ -13,6 +13,7 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import compose, pixel_values
 from webapp.live import Part, Preview, cut
+from webapp.runs import Runs
 from webapp.state import ViewState
 
 FULL = render_scene("sphere_cone", size=(24, 32), images=8).stack
@@ -22,6 +23,7 @@ STACK = replace(FULL, mask=MASK)
 ROBUST = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
 OTHER = analyze(STACK, Options(method="statistical", T=0.05, Ts=0.02, samples=50))
 RESULTS = {"robust": ROBUST, "statistical": OTHER}
+RUNS = Runs(STACK, Options())
 
 
 @pytest.mark.parametrize("thresholds", [Thresholds(0.05, 0.02), Thresholds(0.002, 0.3)])
@@ -30,7 +32,7 @@ def test_labels_are_the_backends_at_the_thresholds_of_the_view(
     thresholds: Thresholds, image: int
 ) -> None:
     state = ViewState(image=image, T=thresholds.T, Ts=thresholds.Ts)
-    frame = compose(STACK, RESULTS, state)
+    frame = compose(RUNS, RESULTS, state)
     expected = label_images(
         STACK.images, ROBUST.linearized_bases, ROBUST.coefficients, STACK.mask, thresholds
     )[image]
@@ -41,17 +43,17 @@ def test_labels_are_the_backends_at_the_thresholds_of_the_view(
 
 
 def test_a_method_to_compare_with_brings_its_own_labels() -> None:
-    frame = compose(STACK, RESULTS, ViewState(image=3, T=0.05, Ts=0.02, beside="statistical"))
+    frame = compose(RUNS, RESULTS, ViewState(image=3, T=0.05, Ts=0.02, beside="statistical"))
     assert frame.beside is OTHER
     assert np.array_equal(frame.beside_labels, OTHER.labels[3])
     assert np.array_equal(frame.labels, ROBUST.labels[3])
-    assert compose(STACK, RESULTS, ViewState()).beside_labels is None
-    missing = compose(STACK, RESULTS, ViewState(beside="classification"))
+    assert compose(RUNS, RESULTS, ViewState()).beside_labels is None
+    missing = compose(RUNS, RESULTS, ViewState(beside="classification"))
     assert missing.beside_labels is None
 
 
 def test_the_thresholds_of_the_run_give_the_labels_of_the_run() -> None:
-    frame = compose(STACK, RESULTS, ViewState(image=3, T=0.05, Ts=0.02))
+    frame = compose(RUNS, RESULTS, ViewState(image=3, T=0.05, Ts=0.02))
     assert frame.labels is not None
     assert np.array_equal(frame.labels, ROBUST.labels[3])
 
@@ -59,7 +61,7 @@ def test_the_thresholds_of_the_run_give_the_labels_of_the_run() -> None:
 @pytest.mark.parametrize("T", [0.001, 0.05, 0.15])
 def test_a_pixel_has_the_label_that_the_picture_shows(T: float) -> None:
     state = ViewState(T=T, Ts=0.02)
-    shown = [compose(STACK, RESULTS, replace(state, image=k)).labels for k in range(8)]
+    shown = [compose(RUNS, RESULTS, replace(state, image=k)).labels for k in range(8)]
     maps = np.stack([labels for labels in shown if labels is not None])
     rows, columns = np.nonzero(STACK.mask)
     for row, column in zip(rows, columns, strict=True):
@@ -76,14 +78,14 @@ def test_linearized_values_of_a_pixel_are_those_of_the_images() -> None:
 
 def test_methods_are_shown_side_by_side_once_both_are_there() -> None:
     state = ViewState(method="statistical", beside="robust")
-    frame = compose(STACK, RESULTS, state)
+    frame = compose(RUNS, RESULTS, state)
     assert (frame.analysis, frame.beside) == (OTHER, ROBUST)
-    assert compose(STACK, {"statistical": OTHER}, state).beside is None
-    assert compose(STACK, RESULTS, replace(state, beside=None)).beside is None
+    assert compose(RUNS, {"statistical": OTHER}, state).beside is None
+    assert compose(RUNS, RESULTS, replace(state, beside=None)).beside is None
 
 
 def test_without_a_result_there_are_no_labels() -> None:
-    frame = compose(STACK, {}, ViewState())
+    frame = compose(RUNS, {}, ViewState())
     assert (frame.analysis, frame.beside, frame.labels) == (None, None, None)
 
 
@@ -91,7 +93,7 @@ def test_an_undetermined_pixel_is_undefined_in_all_images() -> None:
     bases = ROBUST.linearized_bases.copy()
     bases[:, 9, 9] = np.nan
     unknown = replace(ROBUST, linearized_bases=bases)
-    frame = compose(STACK, {"robust": unknown}, ViewState(image=2))
+    frame = compose(RUNS, {"robust": unknown}, ViewState(image=2))
     assert frame.labels is not None
     assert frame.labels[9, 9] == Factor.UNDEFINED
     values = pixel_values(STACK, unknown, (9, 9), Thresholds(0.05, 0.02))
@@ -107,13 +109,13 @@ def preview_of(part: Part, thresholds: Thresholds) -> Preview:
 def test_a_preview_of_all_pixels_takes_the_place_of_the_result() -> None:
     state = ViewState(image=3, T=0.2, Ts=0.05, beside="statistical")
     preview = preview_of(Part(0, 24, 0, 32, 1), state.thresholds)
-    frame = compose(STACK, RESULTS, state, preview)
+    frame = compose(RUNS, RESULTS, state, preview)
     assert frame.preview is preview
     assert frame.analysis is not None
     assert frame.analysis.thresholds == state.thresholds
     assert frame.analysis.linearized_bases is preview.analysis.linearized_bases
     assert np.array_equal(frame.labels, preview.analysis.labels[3])
-    without = compose(STACK, RESULTS, state)
+    without = compose(RUNS, RESULTS, state)
     assert not np.array_equal(frame.labels, without.labels)
     assert frame.beside is OTHER
     assert np.array_equal(frame.beside_labels, without.beside_labels)
@@ -123,7 +125,7 @@ def test_a_preview_of_all_pixels_takes_the_place_of_the_result() -> None:
 def test_a_preview_of_a_part_is_laid_over_the_labels_of_the_result() -> None:
     state = ViewState(image=3, T=0.2, Ts=0.05)
     preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
-    frame, without = (compose(STACK, RESULTS, state, shown) for shown in (preview, None))
+    frame, without = (compose(RUNS, RESULTS, state, shown) for shown in (preview, None))
     assert (frame.analysis, frame.preview) == (ROBUST, preview)
     assert frame.labels is not None
     assert without.labels is not None
@@ -139,6 +141,6 @@ def test_a_preview_of_a_part_is_not_laid_over_another_result() -> None:
     state = ViewState(image=3, T=0.2, Ts=0.05)
     preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
     newer = replace(ROBUST)
-    frame = compose(STACK, {"robust": newer}, state, preview)
+    frame = compose(RUNS, {"robust": newer}, state, preview)
     assert frame.analysis is newer
-    assert np.array_equal(frame.labels, compose(STACK, RESULTS, state).labels)
+    assert np.array_equal(frame.labels, compose(RUNS, RESULTS, state).labels)

@@ -19,6 +19,7 @@ from webapp import painter as module
 from webapp.frame import Frame, Recovered, compose
 from webapp.painter import Painter, describe, render_layer
 from webapp.render import choose_scale, render_residual
+from webapp.runs import Runs
 from webapp.state import ViewState
 
 STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
@@ -73,7 +74,11 @@ def decode(encoded: bytes) -> np.ndarray:
 
 
 def frame(stack: ImageStack = STACK, solved: bool = True, **state: Any) -> Frame:
-    return compose(stack, {"robust": RESULT} if solved else {}, ViewState(T=0.05, Ts=0.02, **state))
+    return compose(
+        Runs(stack, Options()),
+        {"robust": RESULT} if solved else {},
+        ViewState(T=0.05, Ts=0.02, **state),
+    )
 
 
 @pytest.fixture
@@ -119,7 +124,7 @@ def test_a_change_draws_the_parts_it_concerns(
     painter.paint(first, None, rested=False)
     canvas.take()
     state = replace(first.state, **change)
-    painter.paint(compose(STACK, {"robust": RESULT}, state), None, rested=False)
+    painter.paint(compose(Runs(STACK, Options()), {"robust": RESULT}, state), None, rested=False)
     assert set(canvas.take()) == parts
 
 
@@ -131,7 +136,9 @@ def test_a_new_result_is_drawn_though_nothing_else_changed(
     painter.paint(frame(), None, rested=False)
     assert canvas.take()["overlay"] is not None
     other = replace(RESULT, coefficients=RESULT.coefficients[::-1].copy())
-    painter.paint(compose(STACK, {"robust": other}, frame().state), None, rested=False)
+    painter.paint(
+        compose(Runs(STACK, Options()), {"robust": other}, frame().state), None, rested=False
+    )
     assert "overlay" in canvas.take()
 
 
@@ -268,7 +275,7 @@ def test_the_surface_is_sent_once_it_is_turned_and_only_then(
 ) -> None:
     def draw(**state: Any) -> dict[str, Any]:
         shown = ViewState(T=0.05, Ts=0.02, **state)
-        composed = compose(STACK, {"robust": RESULT}, shown, None, RECOVERED)
+        composed = compose(Runs(STACK, Options()), {"robust": RESULT}, shown, None, RECOVERED)
         painter.paint(composed, None, rested=True)
         return canvas.take()
 
@@ -298,6 +305,10 @@ def test_without_a_shape_nothing_is_turned_and_no_light_is_offered(
 
 def test_captions_of_a_shape_say_nothing_of_labels(painter: Painter, canvas: FakeCanvas) -> None:
     shown = ViewState(T=0.05, Ts=0.02, layer="normals")
-    painter.paint(compose(STACK, {"robust": RESULT}, shown, None, RECOVERED), None, rested=True)
+    painter.paint(
+        compose(Runs(STACK, Options()), {"robust": RESULT}, shown, None, RECOVERED),
+        None,
+        rested=True,
+    )
     assert canvas.readout.startswith("normals: red x right")
     assert "labels" not in canvas.readout

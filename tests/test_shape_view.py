@@ -14,6 +14,7 @@ from photolin.shape.resolve import resolve_ambiguity
 from photolin.synthetic import render_scene
 from webapp.access import open_server
 from webapp.frame import Frame, Recovered, compose
+from webapp.runs import Runs
 from webapp.state import ViewState
 from webapp.views.shape import (
     BALL,
@@ -66,7 +67,9 @@ def view(calls: Calls) -> Iterator[ShapeView]:
 
 def frame(result: bool = True, recovered: Recovered | None = RECOVERED, **state: object) -> Frame:
     shown = ViewState(**({"T": 0.05, "Ts": 0.02} | state))  # type: ignore[arg-type]
-    return compose(STACK, {"robust": RESULT} if result else {}, shown, None, recovered)
+    return compose(
+        Runs(STACK, Options()), {"robust": RESULT} if result else {}, shown, None, recovered
+    )
 
 
 def test_the_fifth_point_recovers_and_each_further_one_again(view: ShapeView, calls: Calls) -> None:

@@ -92,7 +92,7 @@ def test_only_the_verb_inspect_knows_the_web_tool() -> None:
         for module, inside in imports(file)
         if module.split(".")[0] in ("webapp", "viser")
     ]
-    assert {(name, inside) for name, _, inside in found} == {("cli.py", True)}
+    assert {(name, inside) for name, _, inside in found} == {("inspect.py", True)}
     assert all(module.startswith("webapp.") for _, module, _ in found)
 
 

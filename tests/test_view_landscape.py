@@ -19,6 +19,7 @@ from photolin.synthetic import render_scene
 from webapp.access import open_server
 from webapp.clicks import Clicks
 from webapp.frame import Frame, compose
+from webapp.runs import Runs
 from webapp.state import ViewState
 from webapp.views import landscape as module
 from webapp.views.landscape import LandscapeView
@@ -85,7 +86,7 @@ class Watched:
     def __post_init__(self) -> None:
         gui, self.clicks = FakeGui(), FakeClicks()
         given: tuple[Any, Any] = (gui, self.clicks)
-        self.view = LandscapeView(*given, STACK, self.moved.append, self.told.append)
+        self.view = LandscapeView(*given, self.moved.append, self.told.append)
 
     def make(self, _: Any, analysis: Analysis, progress: Any, cancel: Any, **__: Any) -> Landscape:
         self.began.append(analysis)
@@ -122,7 +123,9 @@ def frame(analysis: Analysis | None = RESULT, T: float = 0.05, preview: Any = No
     results: dict[Method, Analysis] = {}
     if analysis is not None:
         results[analysis.options.method] = analysis
-    return replace(compose(STACK, results, ViewState(T=T, Ts=0.02)), preview=preview)
+    return replace(
+        compose(Runs(STACK, Options()), results, ViewState(T=T, Ts=0.02)), preview=preview
+    )
 
 
 def drawn(watched: Watched) -> bool:
@@ -258,10 +261,8 @@ def test_a_person_opens_the_map_and_clicks_into_it(page: Any) -> None:
         with tabs.add_tab("One"):
             client.gui.add_html("first")
         with tabs.add_tab("Map"):
-            view = LandscapeView(
-                client.gui, Clicks(client), STACK, moved.append, told.append, SCENE.truth.labels
-            )
-        view.draw(frame())
+            view = LandscapeView(client.gui, Clicks(client), moved.append, told.append, known=True)
+        view.draw(replace(frame(), truth=SCENE.truth.labels))
         views.append(view)
 
     server.server.on_client_connect(connect)

@@ -11,7 +11,6 @@ import pytest
 
 from photolin.analysis import Options
 from photolin.errors import Cancelled, InputError, OptionError
-from photolin.export import result_files
 from photolin.export.surface import surface_files
 from photolin.factors import Thresholds
 from photolin.pipeline import analyze
@@ -20,6 +19,7 @@ from photolin.shape.resolve import resolve_ambiguity
 from photolin.synthetic import render_scene
 from webapp import work as module
 from webapp.runs import Runs
+from webapp.source import Source
 from webapp.state import ViewState
 from webapp.work import EMPTY, Desk, Work, cancelling
 
@@ -75,7 +75,7 @@ def tab() -> Tab:
 
 @pytest.fixture
 def work(tab: Tab) -> Iterator[Work]:
-    made = Work(Runs(STACK, OPTIONS, RESULT), result_files, RESULT.thresholds, tab.desk())
+    made = Work(Runs(STACK, OPTIONS, RESULT), Source(STACK), RESULT.thresholds, tab.desk())
     yield made
     made.close()
 
@@ -161,7 +161,7 @@ def test_a_cancelled_shape_says_what_is_there(
 def test_files_of_a_shape_are_those_of_the_command_line(work: Work, tab: Tab) -> None:
     work.recover(Known(), given_lights=True, px_mm=None)
     tab.wait()
-    work.download("shape", everything=False)
+    work.download("shape", everything=False, notes="")
     tab.wait()
     assert tab.told == []
     (name,) = tab.sent
@@ -179,7 +179,7 @@ def test_files_of_a_shape_are_those_of_the_command_line(work: Work, tab: Tab) ->
 def test_files_of_a_shape_that_is_not_there_are_refused_with_the_way_to_it(
     work: Work, tab: Tab
 ) -> None:
-    work.download("shape", everything=True)
+    work.download("shape", everything=True, notes="")
     tab.wait()
     assert tab.sent == {}
     (error,) = tab.told
@@ -188,7 +188,7 @@ def test_files_of_a_shape_that_is_not_there_are_refused_with_the_way_to_it(
 
 
 def test_without_a_result_there_is_nothing_to_recover_from(tab: Tab) -> None:
-    work = Work(Runs(STACK, OPTIONS), result_files, RESULT.thresholds, tab.desk())
+    work = Work(Runs(STACK, OPTIONS), Source(STACK), RESULT.thresholds, tab.desk())
     work.recover(Known(), given_lights=True, px_mm=None)
     tab.wait()
     assert [str(e) for e in tab.told] == ["there is no result yet; linearize first"]
@@ -196,7 +196,7 @@ def test_without_a_result_there_is_nothing_to_recover_from(tab: Tab) -> None:
 
 def test_the_first_result_moves_sliders_that_nobody_has_touched(tab: Tab) -> None:
     tab.state = ViewState(T=0.07, Ts=0.03)
-    work = Work(Runs(STACK, OPTIONS), result_files, Thresholds(0.07, 0.03), tab.desk())
+    work = Work(Runs(STACK, OPTIONS), Source(STACK), Thresholds(0.07, 0.03), tab.desk())
     work.ensure(tab.state)
     tab.wait()
     assert tab.begun == [work.results["robust"].thresholds]

@@ -6,41 +6,29 @@ from threading import Lock
 
 import viser
 
-from photolin.analysis import Analysis, Options
-from photolin.export import result_files
-from photolin.stack import ImageStack
-
 from .access import Server, open_server
-from .downloads import Pack
-from .runs import Runs
+from .keeper import Keeper
+from .selections import Selections
 from .session import Session
+from .source import Source
 
 
 class App:
     """Serves one stack; attaches a session to each tab and detaches it."""
 
-    def __init__(
-        self,
-        stack: ImageStack,
-        result: Analysis | None = None,
-        *,
-        options: Options | None = None,
-        pack: Pack = result_files,
-        host: str = "127.0.0.1",
-        port: int = 8080,
-    ) -> None:
-        """Start serving; `result` is shown at once, otherwise the first tab computes by `options`.
-
-        `pack` gives the files of a result that a tab downloads.
+    def __init__(self, source: Source, *, host: str = "127.0.0.1", port: int = 8080) -> None:
+        """Start serving.
 
         Raises:
             OptionError: the host or port cannot be used.
         """
-        self._runs = Runs(stack, options or Options(), result)
-        self._pack = pack
+        self._selections = Selections(source)
         self._sessions: dict[int, Session] = {}
         self._lock = Lock()
+        self._untold: list[str] = []
+        """What is to be said to the next tab, as there was none."""
         self.server: Server = open_server(host, port)
+        self._keeper = Keeper(source.place, source.stack.shape, self._tell)
         self.server.server.on_client_connect(self._attach)
         self.server.server.on_client_disconnect(self._detach)
 
@@ -51,12 +39,25 @@ class App:
             self._sessions.clear()
         for session in sessions:
             session.close()
+        self._keeper.close()
         self.server.stop()
 
+    def _tell(self, sentence: str) -> None:
+        """Say something of the session file in all tabs."""
+        with self._lock:
+            sessions = list(self._sessions.values())
+            if not sessions:
+                self._untold.append(sentence)
+        for session in sessions:
+            session.notices.say("Session", sentence, "red")
+
     def _attach(self, client: viser.ClientHandle) -> None:
-        session = Session(client, self._runs, self._pack)
+        session = Session(client, self._selections, self._keeper)
         with self._lock:
             self._sessions[client.client_id] = session
+            untold, self._untold = self._untold, []
+        for sentence in untold:
+            session.notices.say("Session", sentence, "red")
         if client.client_id not in self.server.server.get_clients():  # left while it was built
             self._detach(client)
 
@@ -68,11 +69,8 @@ class App:
 
 
 def serve(
-    stack: ImageStack,
-    result: Analysis | None,
+    source: Source,
     *,
-    options: Options,
-    pack: Pack,
     host: str,
     port: int,
     open_browser: bool,
@@ -84,8 +82,8 @@ def serve(
     """
     # a tab may close while its worker draws; viser warns of every such message
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
-    app = App(stack, result, options=options, pack=pack, host=host, port=port)
-    print(f"photolin: {stack.title} at {app.server.url} (Ctrl-C ends it)", flush=True)
+    app = App(source, host=host, port=port)
+    print(f"photolin: {source.stack.title} at {app.server.url} (Ctrl-C ends it)", flush=True)
     try:
         if open_browser:
             webbrowser.open(app.server.url)

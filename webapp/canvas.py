@@ -130,6 +130,10 @@ class Canvas:
             self._readout = text
             call_javascript(self._client, "window.photolin.setReadout", text)
 
+    def copy(self, text: str) -> None:
+        """Put text on the clipboard of the page's machine, after a click or a key."""
+        call_javascript(self._client, "window.photolin.copy", text)
+
     def fit(self) -> None:
         """Show the whole picture, centred in the free part of the window."""
         call_javascript(self._client, "window.photolin.fit")

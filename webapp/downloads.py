@@ -6,15 +6,19 @@ from dataclasses import replace
 from photolin.analysis import Analysis
 from photolin.errors import OptionError
 from photolin.export import export_files, result_files, safe_name, zip_files
+from photolin.export.html import report_html
 from photolin.export.surface import surface_files
 from photolin.factors import Thresholds
 from photolin.label import label_images
+from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 from .frame import Recovered
 
 SHAPE = "shape"
 """The kind of `make_shape_download`."""
+REPORT = "report"
+"""The kind of `make_report`."""
 Pack = Callable[[Analysis], Mapping[str, bytes]]
 """Gives the files of a result, name to bytes, as `result_files` does."""
 
@@ -63,6 +67,19 @@ def make_download(
         case "masks" | "labels":
             return f"{stem}_{which}_{kind}.zip", zip_files(export_files(analysis, kind, images))
     raise OptionError(f"export is {kind!r}; accepted are masks, labels, linearized and result")
+
+
+def make_report(
+    analysis: Analysis, stack: ImageStack, shape: Shape | None, command: str | None, notes: str
+) -> tuple[str, bytes]:
+    """Name and bytes of the web page that tells a result to others, by arguments of `report_html`.
+
+    Args:
+        analysis: labelled by the thresholds on screen.
+    """
+    stem = safe_name(analysis.title) or "stack"
+    page = report_html(analysis, stack=stack, shape=shape, command=command, notes=notes)
+    return f"{stem}_report.html", page
 
 
 def make_shape_download(recovered: Recovered | None) -> tuple[str, bytes]:

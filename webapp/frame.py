@@ -13,6 +13,7 @@ from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 from .live import Preview
+from .runs import Runs
 from .state import ViewState
 
 
@@ -42,6 +43,10 @@ class Frame:
     """What the labels are by, where no run has caught up with the view's thresholds."""
     recovered: Recovered | None = None
     """The latest shape; None while there is none."""
+    excluded: tuple[int, ...] = ()
+    """Images that the stack is without, numbers of the whole one."""
+    truth: NDArray[np.uint8] | None = None
+    """(K,H,W) true Factor codes; None where they are not known."""
 
     @property
     def shape(self) -> Shape | None:
@@ -62,7 +67,7 @@ class PixelValues:
 
 
 def compose(
-    stack: ImageStack,
+    runs: Runs,
     results: Mapping[Method, Analysis],
     state: ViewState,
     preview: Preview | None = None,
@@ -71,9 +76,10 @@ def compose(
     """The frame of a view.
 
     Args:
+        runs: where the results come from.
         preview: takes the place of the result of the method shown, as far as it goes.
     """
-    analysis = results.get(state.method)
+    stack, analysis = runs.stack, results.get(state.method)
     if preview is not None and (whole := preview.whole()) is not None:
         analysis = whole
     beside = results.get(state.beside) if state.beside is not None else None
@@ -82,7 +88,18 @@ def compose(
     )
     if preview is not None and analysis is preview.near and labels is not None:
         labels = preview.paint(labels, state.image)
-    return Frame(stack, state, analysis, beside, labels, beside_labels, preview, recovered)
+    return Frame(
+        stack,
+        state,
+        analysis,
+        beside,
+        labels,
+        beside_labels,
+        preview,
+        recovered,
+        runs.excluded,
+        runs.truth,
+    )
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

@@ -41,6 +41,11 @@ class Job:
             self._closed = True
             self._stop.set()
 
+    @property
+    def closed(self) -> bool:
+        """Whether nothing is started any more."""
+        return self._closed
+
     def stopping(self) -> bool:
         """Whether what is running has been asked to stop."""
         return self._stop.is_set()

@@ -66,7 +66,7 @@ class Painter:
         result = frame.analysis if state.layer in SIGNED else None
         shape = frame.shape if state.layer in SURFACE else None
         light = state.light if state.layer == "relit" else None
-        look = (state.image, state.layer, state.gain, result, shape, light)
+        look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
         compared = compared_with(frame)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))

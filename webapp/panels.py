@@ -6,13 +6,13 @@ from functools import partial
 
 import viser
 
-from photolin.analysis import Method
-from photolin.factors import LETTERS, Factor, Thresholds
+from photolin.factors import LETTERS, Factor
 from photolin.stack import ImageStack
 
 from .canvas import Canvas
 from .clicks import Clicks
 from .frame import Frame
+from .saved import Saved
 from .state import Pixel, ViewState
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
@@ -20,6 +20,7 @@ from .views.export import ExportView
 from .views.help import HelpView
 from .views.landscape import LandscapeView
 from .views.legend import LegendView
+from .views.notes import NotesView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
@@ -53,6 +54,10 @@ class Actions:
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
     """Take all pins away."""
+    exclude: Callable[[int], None]
+    """Leave an image of the whole stack out, or take it in again."""
+    copy: Callable[[], None]
+    """Copy the command that makes what is shown."""
     tell: Callable[[Exception], None]
     """Say what went wrong."""
 
@@ -65,22 +70,25 @@ class Panels:
         client: viser.ClientHandle,
         canvas: Canvas,
         stack: ImageStack,
-        method: Method,
-        first: Thresholds,
+        state: ViewState,
         actions: Actions,
+        *,
+        known: bool,
     ) -> None:
         """Build them.
 
         Args:
-            method: whose result is shown at first.
-            first: where the sliders stand at first.
+            known: whether frames come with the truth.
+            state: whose method and thresholds are set at first.
         """
         gui, changed, clicks = client.gui, actions.changed, Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
-            self.thresholds = ThresholdView(gui, first, changed, actions.suggest, actions.linearize)
-            self.run = RunView(gui, method, changed, actions.stop)
+            self.thresholds = ThresholdView(
+                gui, state.thresholds, changed, actions.suggest, actions.linearize
+            )
+            self.run = RunView(gui, state.method, changed, actions.stop)
             shares = SharesView(gui)
             self.pixel = PixelView(gui, changed)
             with gui.add_folder("Display"):
@@ -91,7 +99,9 @@ class Panels:
             self.thresholds.add_steps(gui)
             self.samples = SamplesView(gui, clicks, stack, actions.resample, self.thresholds.set_Ts)
         with tabs.add_tab("Map", viser.Icon.MAP):
-            self.landscape = LandscapeView(gui, clicks, stack, self.thresholds.set, actions.tell)
+            self.landscape = LandscapeView(
+                gui, clicks, self.thresholds.set, actions.tell, known=known
+            )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
@@ -101,6 +111,8 @@ class Panels:
             self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self.export = ExportView(gui, actions.download, self.run.add_progress)
+            with gui.add_folder("Session"):
+                self.notes = NotesView(gui, changed, actions.copy)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)
@@ -123,6 +135,12 @@ class Panels:
         for view in self._readers:
             state = view.read(state)
         return state
+
+    def restore(self, saved: Saved) -> None:
+        """Set all widgets as a session was kept."""
+        for view in self._readers:
+            view.restore(saved.state)
+        self.notes.restore(saved.notes)
 
     def draw(self, frame: Frame) -> None:
         """Show a frame in all panels."""
@@ -167,6 +185,7 @@ class Panels:
             "b": self.compare.flicker,
             "x": partial(self.diagnosis.next, Factor.SPECULAR),
             "u": partial(self.diagnosis.next, Factor.UNDEFINED),
+            "c": actions.copy,
             "n": actions.recover,
             "d": self.shape.toggle,
             "escape": actions.stop,

@@ -5,6 +5,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
+import numpy as np
+from numpy.typing import NDArray
+
 from photolin.analysis import Analysis, Cancel, Options, Progress
 from photolin.compiling import tell_compiling
 from photolin.errors import Cancelled
@@ -22,9 +25,24 @@ PATIENCE = 0.05
 class Runs:
     """The results of one stack."""
 
-    def __init__(self, stack: ImageStack, options: Options, result: Analysis | None = None) -> None:
-        """Start with `result`, if there is one; `options` are what a new tab asks for."""
+    def __init__(
+        self,
+        stack: ImageStack,
+        options: Options,
+        result: Analysis | None = None,
+        *,
+        excluded: tuple[int, ...] = (),
+        truth: NDArray[np.uint8] | None = None,
+    ) -> None:
+        """Start with `result`, if there is one; `options` are what a new tab asks for.
+
+        Args:
+            excluded: images that `stack` is without, numbers of the whole stack.
+            truth: (K,H,W) true Factor codes, where they are known.
+        """
         self.stack = stack
+        self.excluded = excluded
+        self.truth = truth
         self.options = options
         self.result = result
         self._done: dict[Options, Analysis] = {}

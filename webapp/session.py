@@ -2,105 +2,91 @@
 
 Widgets and the canvas only report that something changed. One worker thread re-reads them all,
 makes a new ViewState and draws what differs; changes that arrive meanwhile make one more round, so
-the last value always wins and nothing is drawn twice. Long work (`work`) runs in a thread of its
+the last value always wins and nothing is drawn twice. Long work (`bench`) runs in threads of its
 own and reports through the same worker.
 """
 
-import traceback
+from dataclasses import replace
 from threading import Event, Thread
 from time import monotonic
-from typing import Literal
 
 import viser
 
 from photolin.analysis import Analysis, Method
-from photolin.errors import Cancelled, PhotolinError
+from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import Thresholds
 
-from .canvas import Canvas, Window
-from .catch_up import CatchUp
-from .downloads import Pack
+from .bench import Bench
+from .canvas import Canvas
 from .frame import Frame, compose
-from .live import Live, Preview
+from .keeper import Keeper
+from .live import Preview
+from .notices import Notices
 from .painter import Painter
 from .panels import Actions, Panels
-from .runs import Runs
-from .state import MOST_PINS, SURFACE, Pixel, ViewState
+from .pointing import Pointing
+from .saved import Saved
+from .selections import Selections
+from .start import start_from
+from .state import SURFACE, Pixel, ViewState
 from .theme import set_theme
-from .work import Desk, Work
+from .work import Desk
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
-FIRST = Thresholds(0.05, 0.02)
-"""Where the sliders stand until thresholds are given or suggested."""
 
 
 class Session:
     """The widgets, the state and the worker of one tab."""
 
-    def __init__(self, client: viser.ClientHandle, runs: Runs, pack: Pack) -> None:
-        """Build the tab and start to work for it."""
-        self._client, self._runs, self._stack = client, runs, runs.stack
+    def __init__(self, client: viser.ClientHandle, selections: Selections, keeper: Keeper) -> None:
+        """Build the tab, as it was kept, and start to work for it."""
+        self._client, self._source, self._keeper = client, selections.source, keeper
+        self._wake, self._closed = Event(), Event()
+        self.notices = Notices(client, self._closed)
         self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
-        self._pixel: Pixel | None = None
-        self._pointer: Pixel | None = None
-        self._pins: tuple[Pixel, ...] = ()
-        self._light = ViewState.light
-        T, Ts = runs.options.T, runs.options.Ts
-        self._first = Thresholds(FIRST.T if T is None else T, FIRST.Ts if Ts is None else Ts)
-        if runs.result is not None:
-            self._first = runs.result.thresholds
-        self._wake, self._closed = Event(), Event()
-        self._live = Live(self._stack)
-        self._window: Window | None = None
-        self._work = Work(runs, pack, self._first, self._desk())
-        self._catch_up = CatchUp(runs, self._work.deliver, self._tell, self._wake.set)
+        kept = keeper.latest
+        start = start_from(self._source, kept)
+        self._excluded = start.exclusions
+        self._saved: Saved | None = None
+        first = start.state.thresholds if kept is None else None
+        self._bench = Bench(selections, self._excluded, first, self._desk())
         self._changed = monotonic()
-        self._build(client)
+        self._pointing = Pointing(self._wake.set)
+        self._build(start.state)
+        if kept is not None:
+            self._pointing.restore(start.state)
+            self._panels.restore(start)
         self._wake.set()
         Thread(target=self._draw, name="tab", daemon=True).start()
 
     def close(self) -> None:
         """Stop all work for the tab."""
         self._closed.set()
-        self._work.close()
+        self._bench.close()
         self._panels.close()
-        self._catch_up.close()
         self._wake.set()
 
-    def _build(self, client: viser.ClientHandle) -> None:
-        _, H, W = self._stack.shape
-        gui = client.gui
-        set_theme(gui, ViewState.theme)
+    def _build(self, state: ViewState) -> None:
+        _, H, W = self._source.stack.shape
+        client, pointing, gui = self._client, self._pointing, self._client.gui
+        set_theme(gui, state.theme)
         gui.main_panel.dock_right()
         self._canvas = canvas = Canvas(client, H, W)
         self._painter = Painter(canvas)
-        method = self._runs.options.method
-        self._panels = Panels(client, canvas, self._stack, method, self._first, self._actions())
+        known = self._source.truth is not None
+        stack = self._bench.runs.stack
+        self._panels = Panels(client, canvas, stack, state, self._actions(), known=known)
         canvas.on_pick(self._pick)
-        canvas.on_hover(self._point)
+        canvas.on_hover(pointing.hover)
         canvas.on_key(self._press)
-        canvas.on_view(self._see)
-        canvas.on_light(self._shine)
+        canvas.on_view(pointing.see)
+        canvas.on_light(pointing.shine)
 
     # --- what the work does ---
-
-    def _actions(self) -> Actions:
-        return Actions(
-            changed=self._wake.set,
-            suggest=self._work.suggest,
-            linearize=self._work.linearize,
-            stop=self._work.stop,
-            download=self._work.download,
-            recover=self._recover,
-            resample=self._resample,
-            pin=self._pin,
-            unpin=self._unpin,
-            tell=self._tell,
-        )
 
     def _desk(self) -> Desk:
         return Desk(
@@ -111,10 +97,12 @@ class Session:
             progress=self._progress,
             send=self._send,
             shaped=self._shaped,
-            tell=self._tell,
-            refuse=self._refuse,
+            tell=self.notices.tell,
+            refuse=self.notices.refuse,
             changed=self._wake.set,
         )
+
+    # the panels that these move are made later
 
     def _start(self, thresholds: Thresholds) -> None:
         self._panels.thresholds.begin(thresholds)
@@ -138,56 +126,64 @@ class Session:
             self._panels.picture.show("relit")
         self._wake.set()
 
-    def _refuse(self) -> None:
-        self._notify("Still running", "wait until it ends, or cancel it, and try again", "gray")
-
     # --- what the user does ---
+
+    def _actions(self) -> Actions:
+        return Actions(
+            changed=self._wake.set,
+            suggest=self._bench.suggest,
+            linearize=self._bench.linearize,
+            stop=self._bench.stop,
+            download=self._download,
+            recover=self._recover,
+            exclude=self._exclude,
+            copy=self._copy,
+            resample=self._resample,
+            pin=self._pointing.pin,
+            unpin=self._pointing.unpin,
+            tell=self.notices.tell,
+        )
 
     def _press(self, key: str) -> None:
         try:
             self._panels.press(key)
         except Exception as error:
-            self._report(error)
+            self.notices.tell(error)
 
     def _recover(self) -> None:
         view = self._panels.shape
         try:
-            self._work.recover(view.known(), view.given_lights(), view.px_mm())
+            self._bench.work.recover(view.known(), view.given_lights(), view.px_mm())
         except PhotolinError as error:
-            self._tell(error)
+            self.notices.tell(error)
 
     def _pick(self, pixel: Pixel) -> None:
         if not self._panels.take(pixel):
-            self._pixel = pixel
-            self._wake.set()
+            self._pointing.select(pixel)
+
+    def _download(self, kind: str, everything: bool) -> None:
+        self._bench.work.download(kind, everything, self._panels.notes.read())
+
+    def _exclude(self, image: int) -> None:
+        """Leave an image of the whole stack out, or take it in again."""
+        self._excluded = tuple(sorted({*self._excluded} ^ {image}))
+        self._wake.set()
+
+    def _copy(self) -> None:
+        """Copy the command line that makes what is shown."""
+        state, runs = self._read(), self._bench.runs
+        options = replace(runs.options, method=state.method)
+        command = self._source.command(options, state.thresholds, runs.excluded)
+        if command is None:
+            why = "this stack is in memory only; no command line makes its result"
+            self.notices.tell(OptionError(why))
+        else:
+            self._canvas.copy(command)
+            self.notices.say("Copied", command)
 
     def _resample(self) -> None:
         if self._frame is not None:
             self._panels.samples.draw(self._frame)
-        self._wake.set()
-
-    def _pin(self) -> None:
-        """Pin the selected pixel, or take its pin away; the oldest of too many goes."""
-        if (pixel := self._pixel) is None:
-            return
-        others = tuple(pin for pin in self._pins if pin != pixel)
-        self._pins = others if pixel in self._pins else (*others, pixel)[-MOST_PINS:]
-        self._wake.set()
-
-    def _unpin(self) -> None:
-        self._pins = ()
-        self._wake.set()
-
-    def _shine(self, light: tuple[float, float]) -> None:
-        self._light = light
-        self._wake.set()
-
-    def _point(self, pixel: Pixel | None) -> None:
-        self._pointer = pixel
-        self._wake.set()
-
-    def _see(self, window: Window) -> None:
-        self._window = window
         self._wake.set()
 
     # --- drawing ---
@@ -203,24 +199,26 @@ class Session:
                 rough = True  # overtaken by newer thresholds, which are next
             except Exception as error:
                 rough = False
-                self._report(error)
+                self.notices.tell(error)
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""
-        state = ViewState(pixel=self._pixel, pins=self._pins, light=self._light)
-        return self._panels.read(state)
+        return self._panels.read(self._pointing.read(ViewState()))
 
     def _round(self) -> bool:
         """Read all widgets and draw what differs; true when something better is to come."""
-        state, results, frame = self._read(), self._work.results, self._frame
+        if self._excluded != self._bench.runs.excluded:
+            self._select()
+        bench, pointing = self._bench, self._pointing
+        state, results, frame = self._read(), bench.work.results, self._frame
         if frame is None or state != frame.state:
             self._changed = monotonic()
         rested = monotonic() - self._changed >= REST
         moving = self._panels.thresholds.settle(state.thresholds, rested)
-        self._work.ensure(state)
+        bench.work.ensure(state)
         preview = self._follow(state, results)
-        recovered = self._work.recovered
-        pins = tuple((*pin, str(n)) for n, pin in enumerate(self._pins, 1))
+        recovered = bench.work.recovered
+        pins = tuple((*pin, str(n)) for n, pin in enumerate(state.pins, 1))
         marks = (*pins, *self._panels.marks())
         known = (
             frame is not None
@@ -228,13 +226,14 @@ class Session:
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(self._stack, results, state, preview, recovered)
+            self._frame = frame = compose(bench.runs, results, state, preview, recovered)
             self._shown_results = results
-            rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
+            rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
             self._panels.draw(frame)
         else:
-            rough = self._painter.paint(frame, self._pointer, marks, rested=rested)
-        return self._catch_up.pursue(state, results.get(state.method), rested) or rough or moving
+            rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
+        behind = bench.catch_up.pursue(state, results.get(state.method), rested)
+        return self._keep(state, rested) or behind or rough or moving
 
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
         """What the thresholds of the view make of what is on screen, where no run is right yet."""
@@ -247,26 +246,34 @@ class Session:
             late = monotonic() - began > PATIENCE
             return self._closed.is_set() or (late and self._read().thresholds != state.thresholds)
 
-        return self._live.follow(state, near, self._window, overtaken)
+        return self._bench.live.follow(state, near, self._pointing.window, overtaken)
 
-    # --- telling ---
-
-    def _notify(self, title: str, body: str, color: Literal["red", "gray"]) -> None:
-        if not self._closed.is_set():
-            seconds = None if color == "red" else 6
-            self._client.add_notification(title, body, auto_close_seconds=seconds, color=color)
-
-    def _tell(self, error: Exception) -> None:
-        if isinstance(error, Cancelled):
-            self._notify("Cancelled", str(error), "gray")
-        elif isinstance(error, PhotolinError):
-            self._notify("This did not work", str(error), "red")
-        else:
-            self._report(error)
-
-    def _report(self, error: Exception) -> None:
-        """A fault of the program: a short note on screen, the trace in the terminal."""
-        if self._closed.is_set():
+    def _select(self) -> None:
+        """Go on without the images that are left out, with the one shown if it is still there."""
+        before, shown = self._bench.runs.excluded, self._read().image
+        try:
+            self._bench.select(self._excluded)
+        except PhotolinError as error:
+            self._excluded = before
+            self.notices.tell(error)
             return
-        traceback.print_exception(error)
-        self._notify("photolin made a mistake", f"{type(error).__name__}: {error}", "red")
+        count = len(self._source.stack.images)
+        left = [k for k in range(count) if k not in before]
+        now = [k for k in range(count) if k not in self._bench.runs.excluded]
+        image = next((n for n, k in enumerate(now) if k >= left[shown]), len(now) - 1)
+        self._panels.picture.restock(len(now), image)
+
+    def _keep(self, state: ViewState, rested: bool) -> bool:
+        """Keep the session once it rests; whether that is still to come.
+
+        A tab in which nobody has done anything keeps nothing.
+        """
+        if not self._bench.work.results:
+            return False
+        saved = Saved(state, self._bench.runs.excluded, self._panels.notes.read())
+        if saved == self._saved or not rested:
+            return saved != self._saved
+        if self._saved is not None:
+            self._keeper.keep(saved)
+        self._saved = saved
+        return False

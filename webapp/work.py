@@ -12,11 +12,19 @@ from photolin.shape.known import Known
 from photolin.shape.recover import recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 
-from .downloads import SHAPE, Pack, make_download, make_shape_download, relabel
+from .downloads import (
+    REPORT,
+    SHAPE,
+    make_download,
+    make_report,
+    make_shape_download,
+    relabel,
+)
 from .frame import Recovered
 from .job import Job
 from .live import is_behind
 from .runs import Runs
+from .source import Source
 from .state import ViewState
 
 EMPTY = "linearize again starts anew"
@@ -52,13 +60,15 @@ class Desk:
 class Work:
     """The results of a tab, and what makes them."""
 
-    def __init__(self, runs: Runs, pack: Pack, first: Thresholds, desk: Desk) -> None:
+    def __init__(self, runs: Runs, source: Source, first: Thresholds | None, desk: Desk) -> None:
         """Begin with the result of `runs`, if it has one.
 
         Args:
-            first: where the sliders stand as long as nobody has moved them.
+            source: what `runs` are of, some images perhaps left out.
+            first: where the sliders stand as long as nobody has moved them; None where they stand
+                right, and the first run is by them.
         """
-        self._runs, self._pack, self._first, self._desk = runs, pack, first, desk
+        self._runs, self._source, self._first, self._desk = runs, source, first, desk
         self._results: dict[Method, Analysis] = {}
         if runs.result is not None:
             self._results[runs.result.options.method] = runs.result
@@ -98,12 +108,17 @@ class Work:
         state = self._desk.read()
         self._begin(partial(self._linearize, state.method, state.thresholds))
 
-    def download(self, kind: str, everything: bool) -> None:
-        """Send files of what is on screen, see `downloads`."""
+    def download(self, kind: str, everything: bool, notes: str) -> None:
+        """Send files of what is on screen, see `downloads`; `notes` are part of a report."""
         if kind == SHAPE:
             self._begin(self._send_shape)
         else:
-            self._begin(partial(self._send, self._desk.read(), kind, everything))
+            chosen = (
+                partial(self._report, notes)
+                if kind == REPORT
+                else partial(self._pack, kind, everything)
+            )
+            self._begin(partial(self._send, self._desk.read(), chosen))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
         """Recover the shape from the result on screen.
@@ -118,7 +133,8 @@ class Work:
 
     def ensure(self, state: ViewState) -> None:
         """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
-        thresholds = state.thresholds if self._results else None
+        right = self._results or self._first is None
+        thresholds = state.thresholds if right else None
         for method in (state.method, state.beside):
             if method is not None and method not in (*self._results, *self._declined):
                 self._job.start(partial(self._linearize, method, thresholds))
@@ -132,9 +148,11 @@ class Work:
         try:
             work()
         except Exception as error:
-            self._desk.tell(error)
+            if not self._job.closed:  # else others have taken over, and it is not of interest
+                self._desk.tell(error)
         finally:
-            self._desk.busy(False)
+            if not self._job.closed:
+                self._desk.busy(False)
 
     def _linearize(self, method: Method, thresholds: Thresholds | None) -> None:
         """Analyze by `method`; when None, with the thresholds asked for at first."""
@@ -145,6 +163,8 @@ class Work:
         with cancelling("linearization", "the earlier result is kept" if self._results else EMPTY):
             result = self._runs.run(options, self._desk.progress, self._job.stopping)
         self._declined = frozenset(m for m in self._declined if m != method)
+        if self._job.closed:
+            return
         untouched = not self._results and self._desk.read().thresholds == self._first
         self.deliver(method, result)
         if untouched:
@@ -188,13 +208,26 @@ class Work:
         self._recovered = Recovered(shape, analysis)
         self._desk.shaped()
 
-    def _send(self, state: ViewState, kind: str, everything: bool) -> None:
+    def _send(
+        self, state: ViewState, make: Callable[[Analysis, ViewState], tuple[str, bytes]]
+    ) -> None:
         # files are of the whole, as a run would give them, even while a preview is shown
         analysis = self._settled(state)
         self._desk.progress("writing files", 0.5)
         shown = relabel(self._runs.stack, analysis, state.thresholds)
-        image = None if everything else state.image
-        self._hand_over(*make_download(shown, kind, image, self._pack))
+        self._hand_over(*make(shown, state))
+
+    def _pack(
+        self, kind: str, everything: bool, shown: Analysis, state: ViewState
+    ) -> tuple[str, bytes]:
+        pack = partial(self._source.pack, excluded=self._runs.excluded)
+        return make_download(shown, kind, None if everything else state.image, pack)
+
+    def _report(self, notes: str, shown: Analysis, state: ViewState) -> tuple[str, bytes]:
+        runs, found = self._runs, self._recovered
+        command = self._source.command(shown.options, state.thresholds, runs.excluded)
+        shape = None if found is None else found.shape
+        return make_report(shown, runs.stack, shape, command, notes)
 
     def _send_shape(self) -> None:
         self._desk.progress("writing files", 0.5)

@@ -35,6 +35,7 @@ def report_html(
     stack: ImageStack | None = None,
     shape: Shape | None = None,
     command: str | None = None,
+    notes: str = "",
 ) -> bytes:
     """Encode a result as a single HTML file; equal arguments give equal bytes.
 
@@ -43,6 +44,7 @@ def report_html(
         stack: its images, for thumbnails and the histograms of grays and residuals.
         shape: its normals and albedo, for pictures.
         command: the command line that makes it again.
+        notes: the user's own words.
 
     Raises:
         InputError: a stack of another size.
@@ -57,6 +59,7 @@ def report_html(
     parts = [
         f"<h1>{title}</h1>",
         _settings(analysis, command),
+        _notes(notes),
         _remarks(analysis),
         _legend(),
         _pictures(analysis, stack),
@@ -102,6 +105,11 @@ def _settings(analysis: Analysis, command: str | None) -> str:
     ]
     again = f"<p>To make it again:</p><code>{escape(command)}</code>" if command else ""
     return f"<h2>Settings</h2>{_table((), rows)}{again}"
+
+
+def _notes(notes: str) -> str:
+    lines = "<br>".join(map(escape, notes.strip().splitlines()))
+    return f"<h2>In the author's words</h2><p>{lines}</p>" if lines else ""
 
 
 def _remarks(analysis: Analysis) -> str:

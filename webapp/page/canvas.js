@@ -162,6 +162,7 @@ window.openCanvas = (options) => {
     setReadout: marks.setReadout,
     setReach: widgets.setReach,
     setTitles: widgets.setTitles,
+    copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };
 };

@@ -49,6 +49,11 @@ class CompareView:
         """All of one picture, then all of the other."""
         self._divider.value = 0.0 if self._divider.value > 0.5 else 1.0
 
+    def restore(self, state: ViewState) -> None:
+        """Set the comparison of a state."""
+        self._against.value = NONE if state.against is None else state.against
+        self._divider.value, self._difference.value = state.divider, state.difference
+
     def read(self, state: ViewState) -> ViewState:
         """The state with the comparison as set here."""
         return replace(

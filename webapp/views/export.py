@@ -4,16 +4,18 @@ from collections.abc import Callable
 
 import viser
 
-from ..downloads import SHAPE
+from ..downloads import REPORT, SHAPE
 from ..values import choose_option
 
 RESULT = "result (npz and json, zip)"
 SURFACE = "shape (normals, albedo, depth, mesh, lights; zip)"
+PAGE = "report (one web page to send)"
 KINDS = {
     "masks (PNG, zip)": "masks",
     "label maps (indexed PNG, zip)": "labels",
     "linearized (float32 TIFF)": "linearized",
     RESULT: "result",
+    PAGE: REPORT,
     SURFACE: SHAPE,
 }
 TEXT = """
@@ -24,6 +26,8 @@ TEXT = """
 - **result**: what `photolin run` writes, of all images. result.npz holds labels, coefficients and
   linearized bases as NumPy arrays, report.json how they came about. Unpacked into a folder,
   `photolin inspect` opens them again
+- **report**: pictures, shares, settings, your notes and the command that makes the result again,
+  as a single page that needs no network
 - **shape**: what `photolin shape` writes, once the tab Shape has recovered one. normals.tif,
   albedo.tif and depth.tif are numbers, the PNGs to look at; mesh.ply and mesh.obj open in MeshLab
   or Blender; lights.lp is for RTI. x is right, y up, z to the camera
@@ -45,7 +49,7 @@ class ExportView:
     ) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
         self._images = gui.add_dropdown(
-            "Of", (THIS, ALL), hint="Result and shape are of all images"
+            "Of", (THIS, ALL), hint="Result, report and shape are of all images"
         )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         add_progress(gui)
@@ -53,7 +57,7 @@ class ExportView:
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
-            self._images.disabled = self._kind.value in (RESULT, SURFACE)
+            self._images.disabled = self._kind.value in (RESULT, SURFACE, PAGE)
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:

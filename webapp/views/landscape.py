@@ -5,16 +5,13 @@ from functools import partial
 from threading import RLock
 from time import monotonic
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from photolin.analysis import Analysis
 from photolin.compiling import COMPILING, tell_compiling
 from photolin.errors import Cancelled
 from photolin.factors import Thresholds
 from photolin.landscape import Landscape, map_landscape, plateau
-from photolin.stack import ImageStack
 
 from ..clicks import Clicks
 from ..frame import Frame
@@ -51,19 +48,18 @@ class LandscapeView:
         self,
         gui: viser.GuiApi,
         clicks: Clicks,
-        stack: ImageStack,
         move: Callable[[Thresholds], None],
         tell: Callable[[Exception], None],
-        truth: NDArray[np.uint8] | None = None,
+        known: bool = False,
     ) -> None:
         """Build the widgets.
 
         Args:
             move: moves the sliders; called with T and Ts of the cell that is clicked.
             tell: called with what went wrong.
-            truth: (K,H,W) true Factor codes, where known; then the map tells accuracy too.
+            known: whether frames come with the truth; then the map tells accuracy too.
         """
-        self._stack, self._move, self._tell, self._truth = stack, move, tell, truth
+        self._move, self._tell = move, tell
         self._lock = RLock()
         self._frame: Frame | None = None
         self._in_view = False
@@ -74,7 +70,7 @@ class LandscapeView:
         self._began = 0.0
         self._job = Job(lambda work: work(), self._ended)
         self._offered: tuple[Quantity, ...] = tuple(
-            q for q in QUANTITIES if truth is not None or q != "macro accuracy"
+            q for q in QUANTITIES if known or q != "macro accuracy"
         )
         self._quantity = gui.add_dropdown(
             "Map of",
@@ -144,25 +140,25 @@ class LandscapeView:
     def _pursue(self) -> None:
         """Make the map that is wanted, unless another is being made: that is stopped first."""
         with self._lock:
-            wanted = self._wanted()
+            frame, wanted = self._frame, self._wanted()
             idle = wanted is None or not self._in_view or self._landscape() is not None
             if idle or wanted is self._declined:
                 wanted = None
             if self._making is not None and self._making is not wanted:
                 self._job.stop()
-            if wanted is None or self._making is not None:
+            if frame is None or wanted is None or self._making is not None:
                 return
             self._making, self._began = wanted, monotonic()
-            if not self._job.start(partial(self._make, wanted)):
+            if not self._job.start(partial(self._make, frame, wanted)):
                 self._making = None  # the last is just ending, and comes back here
 
-    def _make(self, analysis: Analysis) -> None:
+    def _make(self, frame: Frame, analysis: Analysis) -> None:
         try:
             with tell_compiling(self._progress) as told:
                 made = map_landscape(
-                    self._stack,
+                    frame.stack,
                     analysis,
-                    truth=self._truth,
+                    truth=frame.truth,
                     progress=told,
                     cancel=self._job.stopping,
                 )

@@ -87,6 +87,16 @@ class LegendView:
         """Show or hide a class."""
         self._switches[factor].value = not self._switches[factor].value
 
+    def restore(self, state: ViewState) -> None:
+        """Set the switches of a state, and how its overlay, its picture and the page look."""
+        for factor, handle in self._switches.items():
+            handle.value = factor in state.shown
+        self._opacity.value, self._outlines.value = state.opacity, state.outlines
+        if state.gain is not None:
+            self._gain.value = min(max(state.gain, MIN_GAIN), MAX_GAIN)
+        self._encoding.value = state.encoding
+        self._patterns.value, self._theme.value = state.patterns, state.theme
+
     def read(self, state: ViewState) -> ViewState:
         """The state with switches, opacity, outlines, patterns, theme and gain as set here."""
         return replace(

@@ -71,6 +71,20 @@ class PictureView:
         async def _(_: viser.GuiEvent) -> None:
             actions[self._buttons.value]()
 
+    def restore(self, state: ViewState) -> None:
+        """Set image and layer of a state; layers of a shape wait for one."""
+        self._image.value = min(state.image, self._count - 1)
+        if state.layer in self._layer.options:
+            self._layer.value = state.layer
+
+    def restock(self, count: int, image: int) -> None:
+        """Go on with a stack of `count` images, at `image`, and without a shape."""
+        if self._layer.value in SURFACE:
+            self._layer.value = "input"
+        self.offer(surface=False)
+        self._count = count
+        self._image.value, self._image.max = image, count - 1
+
     def offer(self, surface: bool) -> None:
         """Offer the layers of a shape too, or not."""
         layers = tuple(layer for layer in LAYERS if surface or layer not in SURFACE)

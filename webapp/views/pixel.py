@@ -33,6 +33,10 @@ class PixelView:
         async def _(_: viser.GuiEvent) -> None:
             changed()
 
+    def restore(self, state: ViewState) -> None:
+        """Set the compared method of a state."""
+        self._beside.value = ALONE if state.beside is None else state.beside
+
     def read(self, state: ViewState) -> ViewState:
         """The state with the compared method as set here."""
         beside = next((method for method in METHODS if method == self._beside.value), None)

@@ -83,6 +83,10 @@ class RunView:
         for bar in self._bars:
             bar.show(stage, fraction)
 
+    def restore(self, state: ViewState) -> None:
+        """Set the method of a state."""
+        self._method.value = state.method
+
     def read(self, state: ViewState) -> ViewState:
         """The state with the method as set here."""
         return replace(state, method=choose_option(self._method.value, METHODS, self._fallback))

@@ -163,6 +163,10 @@ class ShapeView:
         value = clamp_number(self._px_mm.value, 0, LARGEST, 0.0)
         return value if value > 0 else None
 
+    def restore(self, state: ViewState) -> None:
+        """Set the lights of a state; 3D waits for a shape."""
+        self._arrows.value = state.arrows
+
     def read(self, state: ViewState) -> ViewState:
         """The state with the switches of the 3D view as set here."""
         return replace(state, relief=self._relief.value is True, arrows=self._arrows.value is True)

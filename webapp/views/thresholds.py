@@ -112,6 +112,11 @@ class ThresholdView:
         self._first, self._history = thresholds, History(thresholds)
         self.set(thresholds)
 
+    def restore(self, state: ViewState) -> None:
+        """Move the sliders to a state's T and Ts, without a step that could be undone."""
+        self.begin(state.thresholds)
+        self._live.value = state.live
+
     def settle(self, thresholds: Thresholds, rested: bool) -> bool:
         """Take note of where the sliders have come to rest; whether that is still to come."""
         if rested:
