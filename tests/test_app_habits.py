@@ -286,6 +286,13 @@ def test_a_tooltip_lies_beside_the_panel_and_takes_no_click(page: Any, app: App)
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= canvas["x"] + canvas["width"]
     assert tip.evaluate("tip => getComputedStyle(tip).pointerEvents") == "none"
+    page.mouse.down()  # who moves the slider looks at the picture
+    page.mouse.up()
+    tip.wait_for(state="hidden")
+    page.wait_for_timeout(800)  # longer than viser waits before it shows one
+    assert tip.is_hidden()
+    widget(page, session._panels.picture._layer).hover()
+    tip.wait_for(state="visible")
 
 
 def test_a_button_says_what_it_does_whenever_its_tab_is_opened(page: Any, app: App) -> None:
@@ -305,11 +312,11 @@ def test_an_export_shows_its_progress_beside_its_button_and_can_be_cancelled(
     page: Any, app: App, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session = enter(page, app)
-    waiting = []
+    going, waiting = session._bench.work, []
 
     def pack(*given: Any) -> tuple[str, bytes]:
         waiting.append(given)
-        while not session._bench.work._job.stopping():
+        while not going._job.stopping():
             time.sleep(0.02)
         return "late.zip", b"late"
 

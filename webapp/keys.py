@@ -38,6 +38,7 @@ KEYS = (
     Key("D", "3D, flat again", ("d",)),
     Key("F, G", "fit, one image pixel on one screen pixel", ("f", "g"), in_page=True),
     Key("E", "export as chosen", ("e",)),
+    Key("C", "copy the command line of what is shown", ("c",)),
     Key("Esc", "cancel what is running", ("escape",)),
     Key("H", "show or hide the hint of the first visit", ("h",), in_page=True),
     Key("?", "show or hide this list over the picture", ("?",), in_page=True),

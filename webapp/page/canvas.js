@@ -106,6 +106,7 @@ window.openCanvas = (options) => {
     .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
     .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
     .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
+    .photolin-quiet .mantine-Tooltip-tooltip{visibility:hidden}
     @media (min-width:3000px) { html{font-size:17px!important} }
     @media (min-width:640px) {
       .mantine-Tooltip-tooltip[data-multiline]{

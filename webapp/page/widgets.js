@@ -1,4 +1,5 @@
-// What viser's widgets leave out: typing beyond the ends of a slider, and tooltips of buttons.
+// What viser's widgets leave out: typing beyond the ends of a slider, tooltips of buttons, and
+// tooltips that go once a widget is used, as one looks at the picture then.
 
 function openWidgets({ listen }) {
   const reaches = new Map(); // id of a slider -> the most that may be typed into its box
@@ -21,6 +22,23 @@ function openWidgets({ listen }) {
     const title = titles.get(button?.id);
     if (title) button.title = title;
   });
+
+  const ROW = 24; // CSS pixels: the pointer is on another widget
+  const quiet = document.documentElement.classList;
+  let usedAt = null; // height of the pointer when a widget was used last
+
+  function use(event) {
+    usedAt = event.clientY ?? usedAt ?? 0;
+    quiet.add("photolin-quiet");
+  }
+
+  listen(window, "pointerdown", use, true);
+  listen(window, "keydown", use, true);
+  listen(window, "pointermove", ({ clientY, buttons }) => {
+    if (usedAt === null || buttons || Math.abs(clientY - usedAt) < ROW) return;
+    usedAt = null;
+    quiet.remove("photolin-quiet");
+  }, true);
 
   return {
     setReach: (id, most) => reaches.set(id, most),
