@@ -18,7 +18,6 @@ from browser import (
 from photolin.analysis import Options
 from photolin.factors import Factor, Thresholds
 from photolin.pipeline import analyze
-from photolin.shadow_level import sample_shadow_level
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.frame import pixel_values
@@ -63,35 +62,6 @@ def go_to(page: Any, tab: str) -> None:
 def push(page: Any, name: str) -> None:
     page.locator("button:visible").get_by_text(name, exact=True).click()
     wait_for_keys(page)
-
-
-def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, app: App) -> None:
-    session = enter(page, app, "Samples")
-    shadows, lit = (np.argwhere(RESULT.labels[0, 3:-3, 3:-3] == f) + 3 for f in (4, 1))
-    clicks = {"shadow": shadows[[5, -5]], "lit": lit[[100]]}
-    taken = []
-    for kind, pixels in clicks.items():
-        push(page, kind)
-        for row, column in pixels.tolist():
-            click_pixel(page, row, column)
-            wait_until(lambda r=row, c=column: (r, c, kind) in session._panels.samples.marks)  # noqa: B023
-            part = STACK.images[0, row - 2 : row + 3, column - 2 : column + 3]
-            taken.append((kind, part.ravel()))
-    both = [np.concatenate([p for k, p in taken if k == kind]) for kind in clicks]
-    expected = sample_shadow_level(*both).Ts
-    before = session._read().thresholds
-    page.get_by_text("50 shadow, 25 lit sampled").wait_for()
-    push(page, "Set Ts")
-    wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    wait_until(lambda: session._panels.thresholds._history.now.Ts == pytest.approx(expected))
-    press(page, "z")
-    wait_until(lambda: session._read().thresholds == before)
-    press(page, "Shift+Z")
-    wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    assert session._pointing.pixel is None  # these clicks select nothing
-    push(page, "stop")
-    click_pixel(page, 20, 30)
-    wait_until(lambda: session._pointing.pixel == (20, 30))
 
 
 def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any, app: App) -> None:

@@ -39,7 +39,7 @@ KEYS = (
     Key("F, G", "fit, one image pixel on one screen pixel", ("f", "g"), in_page=True),
     Key("E", "export as chosen", ("e",)),
     Key("C", "copy the command line of what is shown", ("c",)),
-    Key("Esc", "cancel what is running", ("escape",)),
+    Key("Esc", "cancel what is running, stop sampling", ("escape",)),
     Key("H", "show or hide the hint of the first visit", ("h",), in_page=True),
     Key("?", "show or hide this list over the picture", ("?",), in_page=True),
 )  # fmt: skip

@@ -4,7 +4,7 @@
 // turns around it instead.
 
 function openCamera({ viewer, rows, columns, planes, worldHeight }) {
-  const ROTATE = 1, TRUCK = 2, TOUCH_ROTATE = 64, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
+  const NONE = 0, ROTATE = 1, TRUCK = 2, TOUCH_ROTATE = 64, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
   const MARGIN = 0.98, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
   const FLAT = { near: 1e-4, far: 1e4 };
   const SOLID = { near: 0.1, far: 1e3 }; // these decide how finely depths are told apart
@@ -14,6 +14,7 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
 
   let size = null; // [width, height] of the canvas that the camera was placed for
   let fitted = null; // pose that fit() chose, to stay fitted when the window changes
+  let panning = true; // a drag moves the picture, in 2D
   let orbiting = false; // the picture lies on the relief, and the camera turns around it
 
   const hasPicture = () => Boolean(viewer.nodeRefFromName[planes[0]] && viewer.cameraControl);
@@ -82,11 +83,18 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
   /** What the mouse and fingers do: move the picture, or turn it and move it. */
   function setActions() {
     const controls = viewer.cameraControl;
-    controls.mouseButtons.left = orbiting ? ROTATE : TRUCK;
-    controls.mouseButtons.right = TRUCK;
-    controls.touches.one = orbiting ? TOUCH_ROTATE : TOUCH_TRUCK;
+    controls.mouseButtons.left = orbiting ? ROTATE : panning ? TRUCK : NONE;
+    controls.mouseButtons.right = controls.mouseButtons.middle = TRUCK;
+    controls.touches.one = orbiting ? TOUCH_ROTATE : panning ? TOUCH_TRUCK : NONE;
     controls.touches.two = controls.touches.three = TOUCH_DOLLY_TRUCK;
     controls.dollyToCursor = !orbiting;
+  }
+
+  /** Whether drags with the left button, or one finger, move the picture while it is flat. */
+  function setPanning(on) {
+    if (on === panning) return;
+    panning = on;
+    if (placed()) setActions();
   }
 
   /** Turn around the picture, or face it squarely again; either begins with all of it in view. */
@@ -166,7 +174,7 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
   }
 
   return {
-    hasPicture, placed, fit, oneToOne, setOrbit, follow, fitScale, similarity, project, eye, direction,
+    hasPicture, placed, fit, oneToOne, setPanning, setOrbit, follow, fitScale, similarity, project, eye, direction,
     isOrbiting: () => orbiting,
   };
 }

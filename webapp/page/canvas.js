@@ -6,6 +6,7 @@ window.openCanvas = (options) => {
 
   const NEAREST = 1003; // three.js NearestFilter
   const POST_MS = 50, VIEW_MS = 150;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
 
   const { rows, columns, planes, viewId } = options;
   const viewer = window.__viserMutable;
@@ -42,13 +43,14 @@ window.openCanvas = (options) => {
     viewer.requestRender();
   }
 
-  const page = { ...options, viewer, layer, listen, send, sender, peek };
+  const page = { ...options, viewer, layer, listen, send, sender, peek, CLICK_PIXELS };
   const camera = openCamera(page);
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
   const widgets = openWidgets(page);
-  openInput({ ...page, camera, cards: openCards(page) });
+  const band = openBand({ ...page, camera });
+  openInput({ ...page, camera, band, cards: openCards(page) });
 
   // --- before each frame ---
 
@@ -71,6 +73,7 @@ window.openCanvas = (options) => {
         }
       }),
     );
+    band.draw();
     marks.draw();
     tellView();
   }
@@ -146,6 +149,7 @@ window.openCanvas = (options) => {
 
   function close() {
     closing.abort();
+    band.setSampling(null);
     clearTimeout(viewTimer);
     measure.disconnect();
     layer.remove();
@@ -163,6 +167,8 @@ window.openCanvas = (options) => {
     setReadout: marks.setReadout,
     setReach: widgets.setReach,
     setTitles: widgets.setTitles,
+    setSampling: band.setSampling,
+    setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };

@@ -1,7 +1,8 @@
 // Pointer and keys: which pixel is meant, and who gets a key, the picture or a widget.
 
-function openInput({ viewer, listen, rows, columns, camera, cards, hoverId, pickId, keyId, send, sender, peek }) {
-  const CLICK_PIXELS = 3; // a pointer that moves farther drags
+function openInput({
+  viewer, listen, rows, columns, camera, band, cards, hoverId, pickId, keyId, send, sender, peek, CLICK_PIXELS,
+}) {
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
   const { canvas } = viewer;
@@ -87,7 +88,7 @@ function openInput({ viewer, listen, rows, columns, camera, cards, hoverId, pick
     pressed = event.isPrimary && event.button === 0 ? event : null;
   });
   listen(canvas, "pointerup", release);
-  listen(canvas, "dblclick", () => camera.placed() && camera.fit());
+  listen(canvas, "dblclick", () => camera.placed() && !band.isSampling() && camera.fit());
   // After the widget has had the click; those made with the keyboard have no detail.
   listen(window, "click", ({ detail }) => detail > 0 && setTimeout(giveFocusBack), true);
   listen(window, "keydown", onKey, true);

@@ -24,7 +24,8 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 
 {keys}
 
-Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. In 3D left-drag
+Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. While samples are
+taken a left-drag draws a rectangle, and Shift-drag or right-drag moves. In 3D left-drag
 turns, right-drag moves, the wheel zooms, a click selects the pixel, F and a double click look from
 the front again.
 Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in

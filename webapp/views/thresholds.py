@@ -153,6 +153,10 @@ class ThresholdView:
         for handle in (self._T, self._Ts):
             handle.max = max(handle.max, handle.value)
 
+    def set_T(self, T: float) -> None:
+        """Move the slider T."""
+        self.set(replace(self.read(ViewState()).thresholds, T=T))
+
     def set_Ts(self, Ts: float) -> None:
         """Move the slider Ts."""
         self.set(replace(self.read(ViewState()).thresholds, Ts=Ts))
