@@ -103,11 +103,13 @@ window.openCanvas = (options) => {
   // The panel's scroll bar lies over the right end of its boxes and buttons. Boxes of sliders have no
   // room for four decimals. Tooltips lie over the row above, which may be the next one to click, and
   // take its clicks: where the picture is wide enough, they go beside the panel instead. In a window
-  // of 4K without scaling, viser's letters are tiny.
+  // of 4K without scaling, viser's letters are tiny. Tabs take two rows, not three: what is used
+  // together is then seen together in a window of 1280 x 720.
   const style = document.head.appendChild(document.createElement("style"));
   style.textContent = `
     .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
     .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
+    [role=tab][data-dock-tab]{padding:0 .5em!important}
     .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
     .photolin-quiet .mantine-Tooltip-tooltip{visibility:hidden}
     @media (min-width:3000px) { html{font-size:17px!important} }
