@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import (
-    choose,
     click_pixel,
-    colours_on_screen,
     open_canvas,
     press,
     wait_for_keys,
@@ -124,31 +122,6 @@ def test_a_panel_out_of_view_is_not_drawn_and_up_to_date_once_it_is_opened(
     page.get_by_text("Pixel row 20, column 30.").wait_for()
     go_to(page, "Tune")
     wait_until(lambda: not session._panels.diagnosis._shown)
-
-
-def test_two_pictures_are_split_at_the_divider_or_subtracted(page: Any, app: App) -> None:
-    session = enter(page, app, "Compare")
-    one = colours_on_screen(page, (48, 64)).astype(int)
-    view = session._panels.compare
-    choose(page, view._against, "linearized")
-    wait_until(lambda: session._read().against == "linearized")
-    page.get_by_text("Left: input by robust. Right: linearized by robust.").wait_for()
-
-    def apart() -> tuple[int, int]:
-        """Largest difference to the first picture in its half, and in the other."""
-        shown = colours_on_screen(page, (48, 64)).astype(int)
-        return abs(shown - one)[:, :30].max(), abs(shown - one)[:, 34:].max()
-
-    wait_until(lambda: apart()[0] <= 1)
-    assert apart()[1] > 20
-    press(page, "b")  # all of one
-    wait_until(lambda: max(apart()) <= 1)
-    press(page, "b")  # all of the other
-    wait_until(lambda: min(apart()) > 20)
-    choose(page, view._against, "input")
-    view._difference.value = True
-    session._wake.set()
-    wait_until(lambda: colours_on_screen(page, (48, 64)).max() == 0)
 
 
 def test_a_click_on_the_map_moves_both_sliders(page: Any, app: App) -> None:

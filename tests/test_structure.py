@@ -26,6 +26,8 @@ FLOORS = (
     ("shape", "oracle", "evaluate", "paper"),
     ("pipeline",),
     ("export",),
+    ("panels",),
+    ("figures",),
     ("kinds", "console"),
     ("verbs",),
     ("cli",),

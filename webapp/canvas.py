@@ -22,6 +22,7 @@ from .box import Box, box_in_text
 from .hint import HINT
 from .keys import KEYS
 from .relief import MESH, Relief
+from .second import PLANES, Second
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -70,6 +71,7 @@ class Canvas:
             for name in ("hover", "pick", "key", "view", "light", "band")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
+        self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -82,6 +84,8 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "others": PLANES,
+            "dividerId": self.second.divider_id,
             "bandId": widget_id(self._band),
             "keys": [(key.shown, key.does) for key in KEYS],
             "hint": HINT,

@@ -31,7 +31,7 @@ KEYS = (
     Key("M", "next method", ("m",)),
     Key("P", "pin the selected pixel to compare with", ("p",)),
     Key("X, U", "next image where it is specular, undefined", ("x", "u")),
-    Key("B", "compare: all of one picture, all of the other", ("b",)),
+    Key("B, Shift-B", "compare: one picture alone and the other in turn, both again", ("b", "B")),
     Key("1 … 5", "show or hide D, S, A, C, U", ("1", "2", "3", "4", "5")),
     Key("space held", "without overlay", (" ",), in_page=True),
     Key("N", "recover the shape, as the tab Shape says", ("n",)),

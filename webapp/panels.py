@@ -109,7 +109,9 @@ class Panels:
         with tabs.add_tab("Lights", viser.Icon.BULB):
             self.cloud = CloudView(gui, clicks, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
-            self.compare = CompareView(gui, changed)
+            add_choice = self.pixel.add_choice
+            self.compare = CompareView(gui, clicks, changed, add_choice, known=known)
+            canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self.shape = ShapeView(gui, stack, changed, actions.recover)
             self.run.add_progress(gui)
@@ -192,6 +194,7 @@ class Panels:
             "e": lambda: actions.download(*self.export.chosen()),
             "p": actions.pin,
             "b": self.compare.flicker,
+            "B": self.compare.show_both,
             "x": partial(self.diagnosis.next, Factor.SPECULAR),
             "u": partial(self.diagnosis.next, Factor.UNDEFINED),
             "c": actions.copy,

@@ -46,7 +46,9 @@ function openBand({ viewer, layer, listen, rows, columns, camera, bandId, send, 
   function at({ clientX, clientY }) {
     const canvasBox = canvas.getBoundingClientRect();
     const { scale, left, top } = camera.similarity();
-    return [(clientY - canvasBox.top - top) / scale, (clientX - canvasBox.left - left) / scale];
+    const x = clientX - canvasBox.left;
+    const beyond = camera.half() > 0 && x >= camera.half(); // in the right one of two views
+    return [(clientY - canvasBox.top - top) / scale, (x - (beyond ? camera.half() : 0) - left) / scale];
   }
 
   /** Whole pixels between two corners, [row0, row1, column0, column1]; null beside the picture. */

@@ -25,8 +25,9 @@ function openInput({
       return `ray ${numbers.map((n) => n.toFixed(6)).join(",")}`;
     }
     const { scale, left, top } = camera.similarity();
+    const beyond = camera.half() > 0 && x >= camera.half(); // in the right one of two views
     const row = Math.floor((y - top) / scale);
-    const column = Math.floor((x - left) / scale);
+    const column = Math.floor((x - (beyond ? camera.half() : 0) - left) / scale);
     const inside = row >= 0 && row < rows && column >= 0 && column < columns;
     return inside ? `${row},${column}` : "";
   }

@@ -22,6 +22,10 @@ gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and 
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 
+The tab *Compare* sets another layer, another method or the true labels beside what is shown: split
+at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
+turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
+
 {keys}
 
 Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. While samples are
