@@ -49,12 +49,18 @@ THIS, ALL = "this image", "all images"
 class ExportView:
     """Choice of files and a download button."""
 
-    def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        export: Callable[[str, bool], None],
+        add_progress: Callable[[viser.GuiApi], None],
+    ) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
         self._images = gui.add_dropdown(
             "Of", (THIS, ALL), hint="Result, report, shape and figures decide by themselves"
         )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
+        add_progress(gui)
         gui.add_markdown(TEXT)
 
         @self._kind.on_update
