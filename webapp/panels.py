@@ -126,6 +126,7 @@ class Panels:
             self.export = ExportView(gui, actions.download, self.run.add_progress)
             with gui.add_folder("Session"):
                 self.notes = NotesView(gui, changed, actions.copy)
+            self.export.explain(gui)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)

@@ -61,7 +61,6 @@ class ExportView:
         )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         add_progress(gui)
-        gui.add_markdown(TEXT)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
@@ -70,6 +69,10 @@ class ExportView:
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:
             export(*self.chosen())
+
+    def explain(self, gui: viser.GuiApi) -> None:
+        """Say what the files hold; long, and so below all else of the tab."""
+        gui.add_markdown(TEXT)
 
     def chosen(self) -> tuple[str, bool]:
         """The kind of files, and whether of all images."""
