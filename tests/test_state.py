@@ -20,10 +20,11 @@ def test_equal_scalars_make_equal_and_hashable_states():
 def test_every_field_changes_the_state():
     changed = {
         "image": 1, "layer": "residual", "method": "statistical", "T": 0.1, "Ts": 0.1,
-        "opacity": 0.3, "shown": frozenset(), "outlines": True, "pixel": (0, 0), "gain": 2.0,
+        "opacity": 0.3, "shown": frozenset(), "outlines": True, "patterns": True, "theme": "light",
+        "pixel": (0, 0), "gain": 2.0,
         "live": False, "encoding": "exact (PNG)", "beside": "statistical",
-        "against": "input", "divider": 0.2, "difference": True, "pins": ((1, 2),),
-        "relief": True, "arrows": False, "light": (0.1, 0.2),
+        "against": "truth", "divider": 0.2, "arrangement": "left", "pins": ((1, 2),),
+        "relief": True, "arrows": False, "light": (0.1, 0.2), "often": "lit",
     }  # fmt: skip
     assert set(changed) == set(asdict(ViewState()))
     for name, value in changed.items():
@@ -54,12 +55,26 @@ def test_each_layer_is_accepted(layer):
         ({"image": -1}, "image is -1; accepted is a number from 0"),
         (
             {"layer": "bases"},
-            "layer is 'bases'; accepted are input, linearized, residual, labels, albedo, "
-            "normals, depth, relit",
+            "layer is 'bases'; accepted are input, linearized, residual, labels, how often, "
+            "albedo, normals, depth, relit",
         ),
         (
             {"method": "best"},
             "method is 'best'; accepted are robust, classification, statistical",
+        ),
+        (
+            {"against": "bases"},
+            "against is 'bases'; accepted are input, linearized, residual, labels, how often, "
+            "albedo, normals, depth, relit, truth",
+        ),
+        (
+            {"often": "never"},
+            "often is 'never'; accepted are specular, lit, attached shadow, cast shadow, "
+            "any shadow, undefined",
+        ),
+        (
+            {"arrangement": "over"},
+            "arrangement is 'over'; accepted are split, side by side, difference, left, right",
         ),
         ({"divider": 1.1}, "divider is 1.1; accepted is 0 to 1"),
         (

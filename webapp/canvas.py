@@ -9,7 +9,7 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 
 import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -19,7 +19,11 @@ import viser
 
 from photolin.shape.recover import Shape
 
+from .box import Box, box_in_text
+from .hint import HINT
+from .keys import KEYS
 from .relief import MESH, Relief
+from .second import PLANES, Second
 from .sketch import Sketch
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
@@ -64,11 +68,12 @@ class Canvas:
         )
         # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
         # screens with more than one pixel in it: the page writes them into hidden fields.
-        self._hover, self._pick, self._key, self._view, self._light = (
+        self._hover, self._pick, self._key, self._view, self._light, self._band = (
             client.gui.add_text(name, "", visible=False)
-            for name in ("hover", "pick", "key", "view", "light")
+            for name in ("hover", "pick", "key", "view", "light", "band")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
+        self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -81,6 +86,11 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "others": PLANES,
+            "dividerId": self.second.divider_id,
+            "bandId": widget_id(self._band),
+            "keys": [(key.shown, key.does) for key in KEYS],
+            "hint": HINT,
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -127,6 +137,18 @@ class Canvas:
         told = None if sketch is None else asdict(sketch)
         call_javascript(self._client, "window.photolin.setSketch", told)
 
+    def set_sampling(self, colour: str | None) -> None:
+        """Let drags draw rectangles of a CSS colour "#rrggbb"; None: they move the picture again.
+
+        With Shift or another button they still move it; in 3D nothing is drawn.
+        """
+        call_javascript(self._client, "window.photolin.setSampling", colour)
+
+    def set_boxes(self, boxes: Sequence[tuple[Box, str]]) -> None:
+        """Outline boxes of pixels in CSS colours, in place of the earlier ones; not in 3D."""
+        listed = [(*box, colour) for box, colour in boxes]
+        call_javascript(self._client, "window.photolin.setBoxes", listed)
+
     def set_readout(self, text: str) -> None:
         """Write one line in the lower left corner; an empty text removes it."""
         if text != self._readout:
@@ -145,6 +167,14 @@ class Canvas:
         """Show each image pixel as one pixel of the screen (1 / devicePixelRatio CSS pixels)."""
         call_javascript(self._client, "window.photolin.oneToOne")
 
+    def set_reach(self, slider: viser.GuiSliderHandle[float], most: float) -> None:
+        """Let numbers up to `most` be typed beside a slider that ends earlier."""
+        call_javascript(self._client, "window.photolin.setReach", widget_id(slider), most)
+
+    def set_titles(self, titles: Mapping[str, str]) -> None:
+        """Give buttons, by their names in the page, tooltips."""
+        call_javascript(self._client, "window.photolin.setTitles", list(titles.items()))
+
     def on_pick(self, callback: Callable[[Pixel], None]) -> None:
         """Call back with the pixel that was clicked; clicks beside the picture do nothing."""
 
@@ -159,6 +189,14 @@ class Canvas:
         @self._hover.on_update
         async def _(_: viser.GuiEvent) -> None:
             callback(self._pixel(self._hover.value))
+
+    def on_box(self, callback: Callable[[Box], object]) -> None:
+        """Call back with each rectangle that was drawn; see `set_sampling`."""
+
+        @self._band.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if box := box_in_text(self._band.value.partition(" ")[2], self._shape):
+                callback(box)
 
     def on_view(self, callback: Callable[[Window], None]) -> None:
         """Call back with the part of the picture on screen, once it has come to rest."""
@@ -179,8 +217,8 @@ class Canvas:
     def on_key(self, callback: Callable[[str], None]) -> None:
         """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
 
-        F (fit), G (1:1) and the space bar (held: no overlay) act in the page and are not reported,
-        nor are keys with Ctrl, Alt or Meta, nor arrows on a focused slider.
+        Keys that act in the page (`Key.in_page`) are not reported, nor are keys with Ctrl, Alt or
+        Meta, arrows on a focused slider, and the Escape that closes the list of keys.
         """
 
         @self._key.on_update

@@ -14,6 +14,7 @@ from .clicks import Clicks
 from .frame import Frame
 from .saved import Saved
 from .state import Pixel, ViewState
+from .views.cloud import CloudView
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
@@ -21,6 +22,7 @@ from .views.help import HelpView
 from .views.landscape import LandscapeView
 from .views.legend import LegendView
 from .views.notes import NotesView
+from .views.overview import OverviewView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
@@ -29,6 +31,7 @@ from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
 from .views.thresholds import ThresholdView
+from .viser_internals import button_hints
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,6 @@ class Actions:
     """Recover the shape."""
     retract: Callable[[], None]
     """Take back what was said of what did not work."""
-    resample: Callable[[], None]
-    """Draw the samples again."""
     pin: Callable[[], None]
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
@@ -75,14 +76,17 @@ class Panels:
         actions: Actions,
         *,
         known: bool,
+        whole: ImageStack,
     ) -> None:
         """Build them.
 
         Args:
             known: whether frames come with the truth.
+            whole: `stack` with the images that are left out.
             state: whose method and thresholds are set at first.
         """
-        gui, changed, clicks = client.gui, actions.changed, Clicks(client)
+        gui, changed = client.gui, actions.changed
+        self.clicks = clicks = Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
@@ -96,38 +100,55 @@ class Panels:
                 self.legend = LegendView(gui, stack, changed)
             with gui.add_folder("About this result"):
                 summary = SummaryView(gui)
+        with tabs.add_tab("Overview", viser.Icon.PHOTO):
+            self.overview = OverviewView(
+                gui, clicks, whole, self.picture, changed, actions.exclude, actions.tell
+            )
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self.thresholds.add_steps(gui)
-            self.samples = SamplesView(gui, clicks, stack, actions.resample, self.thresholds.set_Ts)
+            setters = (self.thresholds.set_T, self.thresholds.set_Ts)
+            self.samples = SamplesView(gui, clicks, canvas, changed, *setters)
+            canvas.on_box(self.samples.take_box)
         with tabs.add_tab("Map", viser.Icon.MAP):
             self.landscape = LandscapeView(
                 gui, clicks, self.thresholds.set, actions.tell, known=known
             )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
+        with tabs.add_tab("Lights", viser.Icon.BULB):
+            self.cloud = CloudView(gui, clicks, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
-            self.compare = CompareView(gui, changed)
+            add_choice = self.pixel.add_choice
+            self.compare = CompareView(gui, clicks, changed, add_choice, known=known)
+            canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             retry = (actions.recover, actions.retract)
             self.shape = ShapeView(gui, stack, changed, *retry, canvas.set_sketch)
             clicks.see("shape", self.shape.see)
+            self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
-            self.export = ExportView(gui, actions.download)
+            self.export = ExportView(gui, actions.download, self.run.add_progress)
             with gui.add_folder("Session"):
                 self.notes = NotesView(gui, changed, actions.copy)
+            self.export.explain(gui)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)
-        self._readers = (self.run, *both, self.legend, self.compare, self.shape)
+        self._readers = (self.run, *both, self.legend, self.compare, self.shape, self.overview)
         self._drawers = (
             *(*both, self.samples, self.landscape, shares, summary),
-            *(self.diagnosis, self.compare, self.shape),
+            *(self.diagnosis, self.cloud, self.compare, self.shape, self.overview),
         )
         self._keys = self._bind(actions)
+        for slider, most in self.thresholds.typed:
+            canvas.set_reach(slider, most)
+        canvas.set_titles(button_hints(client))
 
     def close(self) -> None:
         """Stop what panels compute."""
         self.landscape.close()
+        self.overview.close()
+        self.cloud.close()
 
     def read(self, state: ViewState) -> ViewState:
         """The state with all that widgets stand for."""
@@ -146,13 +167,13 @@ class Panels:
         for view in self._drawers:
             view.draw(frame)
 
+    def redraw(self) -> None:
+        """Show what changed in panels without a change of the state."""
+        self.samples.redraw()
+
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""
-        return self.shape.take(pixel) or self.samples.take(pixel)
-
-    def marks(self) -> tuple[tuple[int, int, str], ...]:
-        """(row, column, text) of what was clicked for panels."""
-        return self.samples.marks
+        return self.samples.take(pixel) or self.shape.take(pixel)
 
     def press(self, key: str) -> None:
         """Do what a key stands for, if anything."""
@@ -179,13 +200,16 @@ class Panels:
             "m": self.run.turn,
             "r": actions.linearize,
             "s": actions.suggest,
+            "k": self.overview.leave_out,
+            "K": self.overview.take_all_in,
             "e": lambda: actions.download(*self.export.chosen()),
             "p": actions.pin,
             "b": self.compare.flicker,
+            "B": self.compare.show_both,
             "x": partial(self.diagnosis.next, Factor.SPECULAR),
             "u": partial(self.diagnosis.next, Factor.UNDEFINED),
             "c": actions.copy,
             "n": actions.recover,
             "d": self.shape.toggle,
-            "escape": actions.stop,
+            "escape": lambda: (actions.stop(), self.samples.stop()),
         }

@@ -29,6 +29,7 @@ from .pointing import Pointing
 from .saved import Saved
 from .selections import Selections
 from .state import SURFACE, Pixel, ViewState
+from .theme import set_theme
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
@@ -85,15 +86,14 @@ class Session:
     def _build(self, state: ViewState) -> None:
         _, H, W = self._source.stack.shape
         client, pointing, gui = self._client, self._pointing, self._client.gui
-        gui.configure_theme(
-            control_width="large", show_logo=False, show_share_button=False, dark_mode=True
-        )
+        set_theme(gui, state.theme)
         gui.main_panel.dock_right()
         self._canvas = canvas = Canvas(client, H, W)
         self._painter = Painter(canvas)
         known = self._source.truth is not None
         stack = self._bench.runs.stack
-        self._panels = Panels(client, canvas, stack, state, self._actions(), known=known)
+        whole, actions = self._source.stack, self._actions()
+        self._panels = Panels(client, canvas, stack, state, actions, known=known, whole=whole)
         canvas.on_pick(self._pick)
         canvas.on_hover(pointing.hover)
         canvas.on_key(self._press)
@@ -154,7 +154,6 @@ class Session:
             retract=self.notices.retract,
             exclude=self._exclude,
             copy=self._copy,
-            resample=self._resample,
             pin=self._pointing.pin,
             unpin=self._pointing.unpin,
             tell=self.notices.tell,
@@ -198,11 +197,6 @@ class Session:
             self._canvas.copy(command)
             self.notices.say("Copied", command)
 
-    def _resample(self) -> None:
-        if self._frame is not None:
-            self._panels.samples.draw(self._frame)
-        self._wake.set()
-
     # --- drawing ---
 
     def _draw(self) -> None:
@@ -235,20 +229,20 @@ class Session:
         bench.work.ensure(state)
         preview = self._follow(state, results)
         recovered = bench.work.recovered
-        pins = tuple((*pin, str(n)) for n, pin in enumerate(state.pins, 1))
-        marks = (*pins, *self._panels.marks())
+        marks = tuple((*pin, str(n)) for n, pin in enumerate(state.pins, 1))
         known = (
             frame is not None
             and (state, recovered) == (frame.state, frame.recovered)
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(bench.runs, results, state, preview, recovered)
+            self._frame = frame = compose(bench.runs, results, state, preview, recovered, frame)
             self._shown_results = results
             rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
             self._panels.draw(frame)
         else:
             rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
+            self._panels.redraw()
         behind = bench.catch_up.pursue(state, results.get(state.method), rested)
         return self._keep(state, rested) or behind or rough or moving
 

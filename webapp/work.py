@@ -1,7 +1,6 @@
 """The long work of one tab: linearizing, suggesting thresholds, packing files; one at a time."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from threading import Lock
@@ -23,8 +22,10 @@ from .downloads import (
     make_shape_download,
     relabel,
 )
+from .figure import KINDS as FIGURE_KINDS
+from .figure import make_figure
 from .frame import Recovered
-from .job import Job
+from .job import Job, cancelling
 from .live import is_behind
 from .runs import Runs
 from .source import Source
@@ -105,11 +106,12 @@ class Work:
         if kind == SHAPE:
             self._begin(partial(self._send_shape, convention))
         else:
-            chosen = (
-                partial(self._report, notes)
-                if kind == REPORT
-                else partial(self._pack, kind, everything)
-            )
+            chosen = partial(self._pack, kind, everything)
+            if kind == REPORT:
+                chosen = partial(self._report, notes)
+            elif kind in FIGURE_KINDS:
+                job = self._job
+                chosen = partial(make_figure, self._runs, kind, self._desk.progress, job.stopping)
             self._begin(partial(self._send, self._desk.read(), chosen))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
@@ -216,7 +218,7 @@ class Work:
         analysis = self._settled(state)
         self._desk.progress("writing files", 0.5)
         shown = relabel(self._runs.stack, analysis, state.thresholds)
-        self._desk.send(*make(shown, state))
+        self._hand_over(*make(shown, state))
 
     def _pack(
         self, kind: str, everything: bool, shown: Analysis, state: ViewState
@@ -237,13 +239,9 @@ class Work:
         colour = self._source.colour(analysis, excluded, found.shape, self._desk.progress)
         self._desk.progress("writing files", 0.5)
         result = self._source.pack(analysis, excluded, found.shape)
-        self._desk.send(*make_shape_download(found, result, colour, convention))
+        self._hand_over(*make_shape_download(found, result, colour, convention))
 
-
-@contextmanager
-def cancelling(what: str, then: str) -> Iterator[None]:
-    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
-    try:
-        yield
-    except Cancelled as error:
-        raise Cancelled(f"{what} cancelled; {then}") from error
+    def _hand_over(self, name: str, data: bytes) -> None:
+        if self._job.stopping():
+            raise Cancelled("export cancelled; nothing was saved")
+        self._desk.send(name, data)

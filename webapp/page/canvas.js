@@ -6,8 +6,9 @@ window.openCanvas = (options) => {
 
   const NEAREST = 1003; // three.js NearestFilter
   const POST_MS = 50, VIEW_MS = 150;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
 
-  const { rows, columns, planes, viewId } = options;
+  const { rows, columns, planes, others, viewId } = options;
   const viewer = window.__viserMutable;
   const { canvas, scene } = viewer;
   const closing = new AbortController();
@@ -42,23 +43,27 @@ window.openCanvas = (options) => {
     viewer.requestRender();
   }
 
-  const page = { ...options, viewer, layer, listen, send, sender, peek };
+  const page = { ...options, viewer, layer, listen, send, sender, peek, CLICK_PIXELS };
   const camera = openCamera(page);
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
   const sketch = openSketch({ ...page, camera });
-  openInput({ ...page, camera });
+  const widgets = openWidgets(page);
+  const compare = openCompare({ ...page, camera });
+  const band = openBand({ ...page, camera });
+  openInput({ ...page, camera, band, cards: openCards(page) });
 
   // --- before each frame ---
 
   function beforeRender() {
     if (!camera.hasPicture()) return;
     camera.follow();
-    const isShown = (order) => !(peeking && order > 0);
+    const isShown = (order) => !(peeking && order % 2 > 0); // pictures and overlays in turn
+    const spans = compare.spans();
     const isVisible = (order) => viewer.nodeRefFromName[planes[order]]?.visible ?? true;
     const lies = relief.draw((order) => camera.isOrbiting() && isShown(order) && isVisible(order));
-    planes.forEach((name, order) =>
+    [...planes, ...others].forEach((name, order) =>
       viewer.nodeRefFromName[name]?.traverse((mesh) => {
         if (!mesh.isMesh || !("map" in mesh.material)) return;
         const { material } = mesh;
@@ -69,8 +74,11 @@ window.openCanvas = (options) => {
           material.map.magFilter = NEAREST;
           material.map.needsUpdate = true;
         }
+        compare.cut(mesh, spans[order < planes.length ? 0 : 1]);
       }),
     );
+    compare.draw();
+    band.draw();
     sketch.draw();
     marks.draw();
     tellView();
@@ -88,7 +96,7 @@ window.openCanvas = (options) => {
       Math.max(0, Math.min(count, Math.floor(-start / scale))),
       Math.max(0, Math.min(count, solid ? count : Math.ceil((length - start) / scale))),
     ];
-    const [r, c] = [part(top, canvas.clientHeight, rows), part(left, canvas.clientWidth, columns)];
+    const [r, c] = [part(top, canvas.clientHeight, rows), part(left, camera.half() || canvas.clientWidth, columns)];
     const view = [...r, ...c, (scale * window.devicePixelRatio).toFixed(3)].join(",");
     if (view === viewed) return;
     viewed = view;
@@ -98,9 +106,27 @@ window.openCanvas = (options) => {
 
   // --- settings of the page ---
 
-  // The panel's scroll bar lies over the right end of its boxes and buttons.
+  // The panel's scroll bar lies over the right end of its boxes and buttons. Boxes of sliders have no
+  // room for four decimals. Tooltips lie over the row above, which may be the next one to click, and
+  // take its clicks: where the picture is wide enough, they go beside the panel instead. In a window
+  // of 4K without scaling, viser's letters are tiny. Tabs take two rows, not three: what is used
+  // together is then seen together in a window of 1280 x 720.
   const style = document.head.appendChild(document.createElement("style"));
-  style.textContent = ".mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}";
+  style.textContent = `
+    .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
+    .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
+    [role=tab][data-dock-tab]{padding:0 .5em!important}
+    .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
+    .photolin-quiet .mantine-Tooltip-tooltip{visibility:hidden}
+    @media (min-width:3000px) { html{font-size:17px!important} }
+    @media (min-width:640px) {
+      .mantine-Tooltip-tooltip[data-multiline]{
+        left:calc(var(--photolin-canvas-width) - 15rem - 10px)!important}
+      .mantine-Tooltip-tooltip[data-multiline] .mantine-Tooltip-arrow{display:none}
+    }`;
+  const measure = new ResizeObserver(() =>
+    document.documentElement.style.setProperty("--photolin-canvas-width", `${canvas.clientWidth}px`));
+  measure.observe(canvas);
 
   // viser lowers the resolution on slow machines, which blurs pixels.
   const fixResolution = () =>
@@ -131,7 +157,9 @@ window.openCanvas = (options) => {
 
   function close() {
     closing.abort();
+    band.setSampling(null);
     clearTimeout(viewTimer);
+    measure.disconnect();
     layer.remove();
     style.remove();
     scene.onBeforeRender = () => {};
@@ -145,7 +173,12 @@ window.openCanvas = (options) => {
     setMarks: marks.setMarks,
     setLight: light.setLight,
     setSketch: sketch.setSketch,
+    setComparison: compare.set,
     setReadout: marks.setReadout,
+    setReach: widgets.setReach,
+    setTitles: widgets.setTitles,
+    setSampling: band.setSampling,
+    setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };

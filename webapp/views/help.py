@@ -2,6 +2,8 @@
 
 import viser
 
+from ..keys import tabulate_keys
+
 TEXT = """
 Every pixel of every image is labelled **D** diffuse, **S** specular, **A** attached shadow
 (the surface faces away from the light), **C** cast shadow (something blocks the light) or **U**
@@ -14,6 +16,11 @@ labels alone follow until you linearize again. The view *input* is the photograp
 what it would be with diffuse reflection alone (mid-grey is zero), *residual* the difference.
 Sentences in yellow under *About this result* say what is doubtful.
 
+The tab *Overview* shows all images at once, with the shares of their classes and with what is wrong
+with them: saturated, moved, a copy of another, another exposure, a bad fit. A click goes to an
+image, a click on its corner leaves it out or takes it in again; then all is linearized anew. The
+view *how often* shows in how many images each pixel is specular, lit or in shadow.
+
 The tab *Shape* goes on from there, to the surface and to the lights. It takes what is known of the
 scene: the lights, or those of some images; five points on a sphere, a whole sphere, or normals of
 some pixels; or nothing. A click on *Recover shape* gives normals, albedo and depth, and the views
@@ -21,33 +28,19 @@ some pixels; or nothing. A click on *Recover shape* gives normals, albedo and de
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 
-| key | does |
-|---|---|
-| ← → | previous, next image |
-| ↑ ↓ | view: input, linearized, residual, labels, and those of a shape |
-| [ ] | T down, up |
-| { } | Ts down, up |
-| S | suggest T and Ts |
-| R | linearize again with T and Ts |
-| Z, Shift-Z | undo, redo a change of T or Ts |
-| M | next method |
-| P | pin the selected pixel to compare with |
-| X, U | next image where it is specular, undefined |
-| B | compare: all of one picture, all of the other |
-| 1 … 5 | show or hide D, S, A, C, U |
-| space held | without overlay |
-| N | recover the shape, as the tab Shape says |
-| D | 3D, flat again |
-| F, G | fit, one image pixel on one screen pixel |
-| E | export as chosen |
-| Esc | cancel what is running |
+The tab *Compare* sets another layer, another method or the true labels beside what is shown: split
+at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
+turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
 
-Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. In 3D left-drag
+{keys}
+
+Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. While samples are
+taken a left-drag draws a rectangle, and Shift-drag or right-drag moves. In 3D left-drag
 turns, right-drag moves, the wheel zooms, a click selects the pixel, F and a double click look from
 the front again.
 Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in
 space x is right, y up, z to the camera.
-"""
+""".replace("{keys}", tabulate_keys())
 
 
 class HelpView:

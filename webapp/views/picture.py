@@ -39,14 +39,20 @@ class PictureView:
             marks=(),  # their numbers would lie under the handle
             hint="Image number, from 0 (keys: left and right arrow)",
         )
-        self._buttons = gui.add_button_group(" ", (PREVIOUS, NEXT, FIT, ONE_TO_ONE))
+        self._buttons = gui.add_button_group(
+            " ",
+            (PREVIOUS, NEXT, FIT, ONE_TO_ONE),
+            hint="previous, next: image, round the ends. fit: the whole picture (key: F). 1:1: one "
+            "image pixel on one pixel of the screen (key: G)",
+        )
         self._layer = gui.add_dropdown(
             "View",
             tuple(layer for layer in LAYERS if layer not in SURFACE),
             initial_value="input",
             hint="input: as photographed. linearized: diffuse reflection alone, signed, zero is "
             "mid-grey. residual: input minus linearized, zero is white. Both show labels only as "
-            "outlines. labels: the label map alone. Once a shape is there: its albedo, normals and "
+            "outlines. labels: the label map alone. how often: in how many images each "
+            "pixel is what the tab Overview says. Once a shape is there: its albedo, normals and "
             "depth, and the scene under a light of your own (keys: up and down arrow)",
         )
         for handle in (self._image, self._layer):
