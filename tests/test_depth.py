@@ -181,6 +181,13 @@ def test_normals_that_graze_face_away_or_are_infinite_give_finite_depth() -> Non
     assert compare_depth(depth, z, below).rms < 1
 
 
+def test_slopes_below_single_precision_give_finite_depth() -> None:
+    normals = np.zeros((9, 9, 3))
+    normals[..., 2] = 1
+    normals[4, 4, 0] = 1e-60
+    np.testing.assert_allclose(integrate_normals(normals, np.ones((9, 9), bool)), 0, atol=1e-12)
+
+
 def test_weights_favour_good_normals_whatever_their_scale_and_0_is_undetermined() -> None:
     normals, z, mask = bumps()
     spoiled, weights = normals.copy(), np.ones(mask.shape)

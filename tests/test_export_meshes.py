@@ -1,6 +1,7 @@
 """Meshes in files, as another reader reads them."""
 
 import io
+import tracemalloc
 from typing import Any
 
 import imagecodecs
@@ -92,6 +93,16 @@ def test_obj_names_its_material_and_its_texture(mesh: Mesh) -> None:
     np.testing.assert_array_equal(row * W + column, mesh.pixels)
     wanted = srgb(ALBEDO / ALBEDO.max())[row, column]
     np.testing.assert_allclose(texture[row, column, 1], wanted, atol=0.51)
+
+
+def test_an_obj_takes_little_more_memory_than_it_is_long() -> None:
+    large = build_mesh(np.zeros((400, 400)), np.ones((400, 400), bool))
+    tracemalloc.start()
+    data = mesh_obj(large, "pixels")["mesh.obj"]
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert data.count(b"\n") == 2 + 2 * 160_000 + 2 * 399 * 399
+    assert peak < 4 * len(data)
 
 
 def test_without_albedo_an_obj_has_no_material(mesh: Mesh) -> None:

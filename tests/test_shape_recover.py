@@ -109,6 +109,14 @@ def test_lights_twice_as_strong_halve_the_albedo_and_leave_the_rest() -> None:
     np.testing.assert_allclose(found.lights, shape().lights * 2, rtol=1e-9, atol=1e-12)
 
 
+def test_lights_with_z_away_from_the_camera_are_doubted() -> None:
+    stack, analysis, _ = known()
+    turned = replace(analysis, lights=-np.array(analysis.lights))
+    found = recover_shape(stack, turned, resolve_ambiguity(turned), depth=False)
+    assert "100 % of the normals face away from the camera" in found.resolved.note
+    assert "away" not in shape().resolved.note
+
+
 def test_a_scale_stretches_lengths_and_nothing_else() -> None:
     stack, analysis, truth = known()
     plain = recover_shape(stack, analysis, resolve_ambiguity(analysis))

@@ -113,7 +113,7 @@ def test_images_that_cannot_be_used_are_refused(images, powers: bool, words: str
         resolve_from_lights(coefficients, images, given, powers=powers)
 
 
-@pytest.mark.parametrize("value", [0, np.nan, np.inf])
+@pytest.mark.parametrize("value", [0, np.nan, np.inf, 1e-200, 1e200])
 def test_a_light_that_is_no_direction_is_refused(value: float) -> None:
     coefficients, lights = known()
     given = lights[:5].copy()

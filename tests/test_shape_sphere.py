@@ -53,7 +53,18 @@ def test_normals_are_those_of_the_rendered_sphere() -> None:
     assert not same[~mask & truth.mask].any()
 
 
-@pytest.mark.parametrize("outline", [((1, 2), 0), ((1, 2), -3), ((1, np.nan), 3), ((1, 2), np.inf)])
+@pytest.mark.parametrize(
+    "outline",
+    [
+        ((1, 2), 0),
+        ((1, 2), -3),
+        ((1, np.nan), 3),
+        ((1, 2), np.inf),
+        ((1e308, -1e308), 1e-300),
+        ((1, 2), 1e-300),
+        ((1, 2), 1e300),
+    ],
+)
 def test_an_outline_that_is_none_is_refused(outline) -> None:
     with pytest.raises(InputError, match="radius above 0 pixels"):
         sphere_normals(SHAPE, *outline)

@@ -348,12 +348,31 @@ def test_outputs_that_hold_the_images_or_are_files_are_refused(
     for path in (stack, result):
         line = complaint(["shape", path, stack, "--points", points], capsys)
         assert "holds the images; another folder is accepted" in line
+    line = complaint(["shape", stack, stack / "images", "--points", points], capsys)
+    assert "images: holds the images; another folder is accepted" in line
     assert sorted(p.name for p in stack.iterdir()) == before
     (tmp_path / "file").write_text("mine")
     for verb in ("shape", "lights"):
         assert "file: is a file; a folder" in complaint([verb, stack, tmp_path / "file"], capsys)
     assert "no/such: " in complaint(["shape", "no/such", tmp_path / "out"], capsys)
     assert not (tmp_path / "out").exists()
+
+
+def test_files_that_were_read_are_not_replaced(lit: Path, balls: Path, tmp_path, capsys) -> None:
+    images = tmp_path / "depth.tif"
+    pages = np.stack([imagecodecs.png_decode(p.read_bytes()) for p in sorted(lit.glob("*.png"))])
+    tifffile.imwrite(images, pages, photometric="minisblack")
+    before = images.read_bytes()
+    lights = ["--lights", str(lit / "lights.txt")]
+    line = complaint(["shape", images, tmp_path, *lights], capsys)
+    assert "depth.tif: is part of the input and would be replaced; another folder" in line
+    assert images.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["depth.tif"]
+    shots = tmp_path / "shots"
+    shutil.copytree(balls, shots)
+    np.savetxt(shots / "light_directions.txt", sky())
+    line = complaint(["lights", shots, shots], capsys)
+    assert "light_directions.txt: is part of the input" in line
 
 
 @pytest.mark.parametrize(
@@ -399,9 +418,8 @@ def balls(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_mirror_ball_gives_its_lights_as_files(balls: Path, tmp_path: Path, capsys) -> None:
     run(["lights", balls, tmp_path])
-    files = {"lights.lp", "light_directions.txt", "light_intensities.txt"}
-    assert {p.name for p in tmp_path.iterdir()} >= {"lights.lp", "light_directions.txt"}
-    assert {p.name for p in tmp_path.iterdir()} <= files
+    # no powers, which a ball does not show: those of a stack in the same folder stay
+    assert {p.name for p in tmp_path.iterdir()} == {"lights.lp", "light_directions.txt"}
     names = load_stack(balls).names
     for name in ("lights.lp", "light_directions.txt"):
         found = read_lights(tmp_path / name, names)

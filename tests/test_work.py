@@ -212,3 +212,26 @@ def test_a_cancelled_stage_is_told_as_what_the_user_began() -> None:
     expected = f"^linearization cancelled; {EMPTY}$"
     with pytest.raises(Cancelled, match=expected), cancelling("linearization", EMPTY):
         raise Cancelled("coefficients was cancelled")
+
+
+class Slow(dict[str, object]):
+    """While it is copied, something else happens."""
+
+    def __init__(self, meanwhile: threading.Thread) -> None:
+        self._meanwhile = meanwhile
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def keys(self):  # type: ignore[override]
+        self._meanwhile.start()
+        self._meanwhile.join(0.2)
+        return super().keys()
+
+
+def test_results_that_arrive_at_once_are_all_kept(work: Work, monkeypatch) -> None:
+    other = threading.Thread(target=lambda: work.deliver("statistical", RESULT))
+    monkeypatch.setattr(work, "_results", Slow(other))
+    work.deliver("classification", RESULT)
+    other.join(5)
+    assert set(work.results) == {"classification", "statistical"}

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from threading import Lock
 
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError
@@ -70,8 +71,9 @@ class Work:
         """
         self._runs, self._source, self._first, self._desk = runs, source, first, desk
         self._results: dict[Method, Analysis] = {}
+        self._exchange = Lock()
         if runs.result is not None:
-            self._results[runs.result.options.method] = runs.result
+            self._results = {runs.result.options.method: runs.result}
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
         self._recovered: Recovered | None = None
@@ -89,7 +91,9 @@ class Work:
 
     def deliver(self, method: Method, result: Analysis) -> None:
         """Take a result that was made elsewhere."""
-        self._results = {**self._results, method: result}
+        # a run and what follows the sliders may both end at once, each in a thread of its own
+        with self._exchange:
+            self._results = {**self._results, method: result}
 
     def stop(self) -> None:
         """Ask what is running to stop."""

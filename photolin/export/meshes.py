@@ -10,6 +10,9 @@ from ..errors import InputError
 from ..shape.mesh import Mesh
 from .maps import AXES, Unit
 
+LINES = 1 << 16
+"""Lines of OBJ that are written at once."""
+
 
 def mesh_ply(mesh: Mesh, unit: Unit, albedo: NDArray[np.floating] | None = None) -> bytes:
     """Encode a mesh as binary little-endian PLY.
@@ -85,10 +88,22 @@ def mesh_obj(
         buffer = io.BytesIO()
         Image.fromarray(colours).save(buffer, "PNG")
         files = {f"{stem}.mtl": material.encode("ascii"), f"{stem}.png": buffer.getvalue()}
-    lines += ["v {:.7g} {:.7g} {:.7g}".format(*v) for v in mesh.vertices.tolist()]
-    lines += ["vt {:.7g} {:.7g}".format(*v) for v in mesh.uv.tolist()]
-    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in (mesh.faces + 1).tolist()]
-    return {f"{stem}.obj": ("\n".join(lines) + "\n").encode("ascii")} | files
+    text = io.BytesIO()
+    text.write(("\n".join(lines) + "\n").encode("ascii"))
+    _write_lines(text, "v %.7g %.7g %.7g\n", mesh.vertices)
+    _write_lines(text, "vt %.7g %.7g\n", mesh.uv)
+    _write_lines(text, "f %d/%d %d/%d %d/%d\n", mesh.faces.repeat(2, axis=1), 1)
+    return {f"{stem}.obj": text.getvalue()} | files
+
+
+def _write_lines(
+    text: io.BytesIO, line: str, rows: NDArray[np.floating] | NDArray[np.int32], more: int = 0
+) -> None:
+    """A line for each of `rows` (N,M), with `more` added to its numbers."""
+    # numbers of Python take ten times the memory of those of an array: a few at a time
+    for start in range(0, len(rows), LINES):
+        some = rows[start : start + LINES] + more
+        text.write((line * len(some) % tuple(some.ravel().tolist())).encode("ascii"))
 
 
 def _white(albedo: NDArray[np.floating]) -> float:

@@ -75,16 +75,20 @@ def build_mesh(
                 f"no three neighbouring pixels have depth without a jump, at a step of {step}; "
                 "a surface of some pixels, smaller steps and more vertices are accepted"
             )
-        pixels, numbers = np.unique(faces, return_inverse=True)
+        used = np.zeros(known.size, np.bool_)
+        used[faces] = True
+        pixels = np.flatnonzero(used)
         if most_vertices is None or len(pixels) <= most_vertices:
             break
         step += 1
     H, W = mask.shape
+    numbers = np.empty(known.size, np.int32)
+    numbers[pixels] = np.arange(len(pixels), dtype=np.int32)
     row, column = np.divmod(pixels, W)
     x, y = column + 0.5 - W / 2, H / 2 - row - 0.5
     return Mesh(
         vertices=(px * np.stack([x, y, known[row, column]], axis=1)).astype(np.float32),
-        faces=numbers.reshape(-1, 3).astype(np.int32),
+        faces=numbers[faces],
         uv=np.stack([(column + 0.5) / W, 1 - (row + 0.5) / H], axis=1).astype(np.float32),
         pixels=pixels.astype(np.int64),
     )
@@ -101,10 +105,11 @@ def _check_options(px: float, step: int, most_vertices: int | None, steepest: fl
         raise OptionError(f"steepest is {steepest}; accepted is a rise over run above 0")
 
 
-def _triangles(depth: NDArray[np.float64], step: int, steepest: float) -> NDArray[np.int64]:
+def _triangles(depth: NDArray[np.float64], step: int, steepest: float) -> NDArray[np.int32]:
     """(M,3) flat indices of pixels, counter-clockwise seen from the camera, in raster order."""
     z = depth[::step, ::step]
-    index = np.arange(depth.size, dtype=np.int64).reshape(depth.shape)[::step, ::step]
+    # half the memory, and more than any picture has pixels
+    index = np.arange(depth.size, dtype=np.int32).reshape(depth.shape)[::step, ::step]
     corners = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1], np.s_[1:, 1:]
     a, b, c, d = (index[at] for at in corners)
     za, zb, zc, zd = (z[at] for at in corners)

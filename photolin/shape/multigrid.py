@@ -98,6 +98,8 @@ def solve_laplace(
             break
         guess = _cycle(grids, last, rest.astype(np.float32)).astype(np.float64)
         now = (rest * guess).sum()
+        if now == 0:  # what is left is below single precision
+            break
         step = guess + now / before * step
         change = grid.residual(nothing, step)
         length = -now / (step * change).sum()

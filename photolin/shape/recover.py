@@ -1,6 +1,6 @@
 """From a linearization to normals, albedo, lights and depth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from .resolved import Resolved
 
 LEAST_MM, MOST_MM = 1e-6, 1e6
 """Sides of a pixel that are accepted, mm."""
+MOST_AWAY = 0.5
+"""Share of normals that face away from the camera, which sees none of those, from which on the note
+warns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,13 @@ def recover_shape(
     powers = np.linalg.norm(lights, axis=1)
     bases = fit_grazing(stack, analysis, powers, threads=threads, progress=progress, cancel=cancel)
     normals, albedo = normals_from_bases(bases, resolved.matrix)
+    away = (normals[..., 2] < 0).sum() / max(analysis.determined().sum(), 1)
+    if away > MOST_AWAY:
+        doubt = (
+            f"; {100 * away:.0f} % of the normals face away from the camera, as when the lights "
+            "are given with z away from it"
+        )
+        resolved = replace(resolved, note=resolved.note + doubt)
     z = None
     if depth:
         z = integrate_normals(normals, analysis.mask, progress=progress, cancel=cancel)

@@ -9,6 +9,9 @@ from ..errors import DegenerateError, InputError
 from .directions import FLAT, SINGULAR, angles_between, fit_directions, normalize
 from .resolved import Kind, Resolved, set_scale
 
+LEAST, MOST = 1e-9, 1e9
+"""Lengths between which x y z are a light, those of `photolin.stack.check_lights`."""
+
 
 def resolve_from_lights(
     coefficients: NDArray[np.floating],
@@ -81,11 +84,12 @@ def check(
             f"known lights of images {numbers.tolist()}: {fault}; different numbers from 0 to "
             f"{count - 1} are accepted"
         )
-    bad = ~(np.isfinite(lights).all(axis=1) & lights.any(axis=1))
+    size = np.abs(lights).max(axis=1)
+    bad = ~((size > LEAST) & (size < MOST))
     if bad.any():
         raise InputError(
             f"the known light of image {numbers[bad.argmax()]} is zero or not finite; x y z of a "
-            "direction is accepted"
+            f"length from {LEAST:g} to {MOST:g} is accepted"
         )
 
 

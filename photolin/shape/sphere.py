@@ -13,6 +13,8 @@ from .directions import (
 )
 from .resolved import Resolved, set_scale
 
+FAR = 1e9
+"""Pixels: largest radius and farthest centre; also 1 / the least radius. Squares do not overflow."""
 RIM = 0.95
 """Share of the radius that is used: beyond it a pixel spans many normals."""
 MIN_PIXELS = 30
@@ -46,12 +48,12 @@ def sphere_normals(
         (H,W,3) unit normals, x right, y up, z to the camera, 0 outside; (H,W) true inside.
 
     Raises:
-        InputError: the radius is not above 0, or anything is not finite.
+        InputError: the radius is not above 0, or anything is not finite or beyond FAR.
     """
-    if not (np.isfinite([*centre, radius]).all() and radius > 0):
+    if not (np.abs([*centre, radius]).max() <= FAR and radius >= 1 / FAR):
         raise InputError(
             f"the sphere's outline is centre {centre} and radius {radius}; accepted are a finite "
-            "(row, column) and a radius above 0 pixels"
+            f"(row, column), and a radius above 0 pixels, of {FAR:g} at most"
         )
     row, column = np.mgrid[: shape[0], : shape[1]]
     x, y = (column - centre[1]) / radius, (centre[0] - row) / radius

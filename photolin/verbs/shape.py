@@ -30,7 +30,7 @@ from ..shape.known import Sphere, read_known
 from ..shape.recover import Shape, check_scale, recover_shape
 from ..shape.resolve import NOTHING, Known, resolve_ambiguity
 from ..stack import ImageStack
-from . import COMMAND, read_stack
+from . import COMMAND, check_kept, read_stack
 
 
 def shape(
@@ -71,7 +71,7 @@ def shape(
     given = is_result(path)
     was, reading = load_result_source(path) if given else (path, reading)
     source = stack or was or path if given else path
-    if os.path.realpath(source) == os.path.realpath(out):
+    if os.path.realpath(out) in map(os.path.realpath, (source, source / "images")):
         raise OutputError(f"{out}: holds the images; another folder is accepted")
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
         if given:
@@ -88,12 +88,14 @@ def shape(
         colour = measure_colour(source, reading, result, found, progress)
     files = surface_files(found, result, colour, convention="directx" if directx else "opengl")
     about = {"command": COMMAND.get(), "stack_path": source, "load_options": reading}
+    files = result_files(result, shape=found, **about) | files
+    check_kept(out, files, images.files)
     # all at once: an interruption leaves either all or what was there before
-    write_files(out, result_files(result, shape=found, **about) | files)
+    write_files(out, files)
     print(f"{result.title}: {found.resolved.note}")
     if found.resolved.residual:
         print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
-    print(f"written result.npz, report.json, {', '.join(files)} to {out}")
+    print(f"written {', '.join(files)} to {out}")
 
 
 def measure_shape(
@@ -171,8 +173,11 @@ def lights(
             f"{balls}: image {images.names[missing[0]]} shows no spot on the ball; "
             "take it out, or mark the ball better"
         )
+    # no powers: a ball does not show them, and a stack in OUT may have its own
+    name = "light_directions.txt"
     files = {"lights.lp": lights_lp(found.directions, images.names)}
-    files |= lights_diligent(found.directions)
+    files[name] = lights_diligent(found.directions)[name]
+    check_kept(out, files, images.files)
     write_files(out, files)
     row, column = found.centre
     print(f"ball: centre row {row:.1f}, column {column:.1f}, radius {found.radius:.1f} pixels")
