@@ -23,7 +23,7 @@ FLOORS = (
     ("linearize", "follow"),
     ("near_light", "dimensions", "confidence"),
     ("landscape", "overview"),
-    ("shape", "oracle", "evaluate", "paper"),
+    ("shape", "oracle", "evaluate", "paper", "light_powers"),
     ("pipeline",),
     ("export",),
     ("kinds", "console"),
