@@ -195,15 +195,28 @@ def stack_summary(stack: ImageStack) -> str:
     )
 
 
-MEASURES = """\
-macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect
+MEASURES = {
+    "macro": """\
+macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect""",
+    "p99": """\
 rms: root mean square of linearized minus ideal image, fraction of full scale
-p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale
-light error: mean angle between true and estimated lights, up to one linear map for all, degrees
-normals: angle between true and found normals, degrees; pixels without one are counted apart
-depth: root mean square and largest error, mm, less the mean error of each connected part
-lights as found: mean angle between true lights and those of the shape, without any map, degrees"""
-"""What the numbers of an evaluation mean, a line each."""
+p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale""",
+    "light error": """\
+light error: mean angle between true and estimated lights, up to one linear map for all, degrees""",
+    r"normals( \(|  )": """\
+normals: angle between true and found normals, degrees; pixels without one are counted apart""",
+    r"depth( \(|  )": """\
+depth: errors in mm, less the mean error of each part (for the median, less its median error); parts
+    are bounded by outlines and by jumps of the true depth""",
+    "lights as found": """\
+lights as found: mean angle between true lights and those of the shape, without any map, degrees""",
+}
+"""What the numbers of an evaluation mean, by what names them in it."""
+
+
+def explain_measures(text: str) -> str:
+    """The lines of MEASURES for what an evaluation holds."""
+    return "\n".join(line for name, line in MEASURES.items() if re.search(name, text))
 
 
 def remarks(of: ImageStack | Analysis) -> list[str]:

@@ -7,8 +7,8 @@ from .errors import PhotolinError
 from .shape.some_lights import resolve_from_lights
 
 UNEVEN = 0.02
-"""Mean change of exposure against the given powers from which on it is worth a closer look: 0.015 at
-most on real stacks whose powers were measured, 0.04 and more where powers vary by 20 %."""
+"""Mean change of exposure against the given powers from which on it is worth a closer look: at most
+0.015 on real stacks whose powers were measured, 0.04 and more where powers vary by 20 %."""
 ALIKE = 1e-3
 """Relative difference of lengths up to which lights are given as equally strong."""
 BELONG = 2.0

@@ -1,6 +1,7 @@
 """Verbs from linearized images to normals, depth and lights."""
 
 import os
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -176,7 +177,8 @@ def measure_shape(
 def measure_colour(
     path: Path, reading: LoadOptions, analysis: Analysis, found: Shape, progress: Progress
 ) -> NDArray[np.float32] | None:
-    """Albedo (H,W,3) of a colour stack; None where the images are gray or arrays."""
+    """Albedo (H,W,3) of a colour stack, gray where no observation is D; None where the images are
+    gray or arrays."""
     try:
         channels = load_channels(path, reading, progress)
         planes = [
@@ -185,7 +187,9 @@ def measure_colour(
         ]
     except InputError:
         return None
-    return np.stack(planes, axis=2)
+    colour = np.stack(planes, axis=2)
+    # where no observation is D, as in dark creases, nothing tells the colour
+    return np.where(np.isnan(colour).any(axis=2)[..., None], found.albedo[..., None], colour)
 
 
 def lights(
@@ -194,6 +198,10 @@ def lights(
     reading: LoadOptions = LoadOptions(),
 ) -> None:
     """Light directions from images of a mirror ball: OUT/lights.lp and light_directions.txt.
+
+    A ball does not show how strong a light is. photolin shape STACK OUT2 --some-lights
+    OUT/lights.lp takes directions alone, and the images of STACK tell the powers; as --lights they
+    would count as equally strong.
 
     Args:
         balls: Images of the ball, one for each light, with a mask of its disc.
@@ -225,4 +233,5 @@ def lights(
     write_files(out, files)
     row, column = found.centre
     print(f"ball: centre row {row:.1f}, column {column:.1f}, radius {found.radius:.1f} pixels")
-    print(f"written {', '.join(files)} to {out}")
+    print(f"written {', '.join(files)} to {out}: directions, no powers")
+    print(f"next: photolin shape STACK OUT --some-lights {shlex.quote(str(out / 'lights.lp'))}")
