@@ -68,9 +68,11 @@ def doubt_axes(
     best = min(each, key=lambda change: each[change])
     if not (each[best] < BETTER * misfit and each[best] < FITTING):
         return ""
-    # the picture's own border is no outline that would tell
     change = best
-    if best == Y and not known.all() and points_inward(n * (1, -1, 1), smooth.used, known):
+    if best == Y and mask.all():
+        # the picture's own border is no outline that would tell
+        change = "y (or x) turned round"
+    elif best == Y and points_inward(n * (1, -1, 1), smooth.used, known):
         change = "x turned round (or y, where the object is hollow)"
     return (
         "the normals belong to no surface as they are (dp/dy and dq/dx differ by "

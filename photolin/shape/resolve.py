@@ -9,7 +9,6 @@ from ..analysis import Analysis
 from ..errors import DegenerateError, InputError
 from .directions import normalize
 from .known import Known
-from .points import resolve_from_points
 from .resolved import Resolved
 from .some_lights import resolve_from_lights
 from .sphere import resolve_from_sphere, sphere_normals
@@ -70,7 +69,10 @@ def _from_known(analysis: Analysis, known: Known) -> Resolved:
     if known.points:
         rows, columns = np.array(known.points).T
         normals = np.array(known.normals) if known.normals else _on_sphere(known, mask.shape)
-        return resolve_from_points(bases, rows, columns, normals)
+        # what it needs of scipy takes a third of a second to import
+        from .surface_points import resolve_from_surface_points
+
+        return resolve_from_surface_points(bases, mask, rows, columns, normals)
     assert known.sphere is not None
     row, column, radius = known.sphere
     return resolve_from_sphere(bases, mask, (row, column), radius)
