@@ -14,7 +14,7 @@ from .directions import (
 from .resolved import Resolved, set_scale
 
 FAR = 1e9
-"""Pixels: largest radius and farthest centre; also 1 / the least radius. No square overflows."""
+"""Pixels: largest radius and farthest centre; 1 / FAR is the least radius. No square overflows."""
 RIM = 0.95
 """Share of the radius that is used: beyond it a pixel spans many normals."""
 MIN_PIXELS = 30
