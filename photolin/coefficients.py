@@ -42,13 +42,7 @@ def estimate_coefficients(
     K = len(stack.images)
     X = np.ascontiguousarray(stack.images.reshape(K, -1)[:, stack.pixels])
     A = X[list(base_images)]
-    rng = np.random.default_rng([options.seed, 1])
-    triples, inverses = draw_samples(A, options.samples, rng)
-    if len(triples) == 0:
-        raise DegenerateError(
-            f"base images {base_images}: no three pixels tell them apart; "
-            "their lights may lie in one plane, or they share too few lit pixels"
-        )
+    triples, inverses = draw_pixels(A, base_images, options.samples, options.seed)
     out, support = np.empty((K, 3), np.float32), np.empty(K, np.int32)
     keep = int(np.ceil(KEEP * len(triples)))
     T, Ts = np.float32(thresholds.T), np.float32(thresholds.Ts)
@@ -63,6 +57,23 @@ def estimate_coefficients(
     coefficients = out.astype(np.float64)
     coefficients[list(base_images)] = np.eye(3)
     return coefficients
+
+
+def draw_pixels(
+    A: NDArray[np.floating], base_images: tuple[int, int, int], count: int, seed: int
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """`draw_samples` of pixels, whose bases are A (3,M); each seed gives the same ones.
+
+    Raises:
+        DegenerateError: no sample determines a candidate.
+    """
+    triples, inverses = draw_samples(A, count, np.random.default_rng([seed, 1]))
+    if len(triples) == 0:
+        raise DegenerateError(
+            f"base images {base_images}: no three pixels tell them apart; "
+            "their lights may lie in one plane, or they share too few lit pixels"
+        )
+    return triples, inverses
 
 
 def draw_samples(

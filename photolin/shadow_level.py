@@ -19,6 +19,17 @@ SPREAD = 3.8
 """Ts above the shadows' level, in standard deviations of the noise there."""
 GRAYS = slice(32, 96)
 """Bins whose level the dark mode has to rise from: beyond shadows, still dark."""
+DEVIATIONS = 3.0
+"""Ts above the middle of sampled shadows, in standard deviations."""
+COVERED = 0.95
+"""Share of sampled shadows that lie below Ts in any case; what is brighter may be lit pixels among
+them, and does not widen their spread."""
+MEAN_ABOVE = 0.6573
+"""Mean of a normal distribution between its middle and COVERED of it, in standard deviations."""
+HALF_STEP = 2.0**-17
+"""Half a gray level of 16 bits: Ts above the brightest shadow where nothing says how far."""
+BELOW_FULL = 1 - 2.0**-24
+"""The highest Ts."""
 SMOOTHING = np.array([1, 4, 6, 4, 1]) / 16
 
 
@@ -82,10 +93,10 @@ def shadow_bins(histogram: NDArray[np.float64], black: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class ShadowLevel:
-    """Ts between sampled shadows and sampled lit pixels."""
+    """Ts above sampled shadows, and below sampled lit pixels."""
 
     Ts: float
-    """Fraction of full scale."""
+    """Fraction of full scale, in [0, 1)."""
     error: float
     """Share of the samples on the wrong side, each kind counted alike; 0 to 1."""
 
@@ -95,30 +106,60 @@ def sample_shadow_level(
 ) -> ShadowLevel:
     """Ts the paper's way: from pixels that someone points out as shadow, and as lit.
 
-    With both, the level that puts the smallest share on the wrong side, in the middle of the
-    levels that do so equally; with shadows alone, three of their standard deviations above their
-    mean, at least their maximum.
+    The paper: "The threshold Ts [...] can be determined by manually sampling some pixels in shadow
+    regions" (below Eq. 3); how is left open. Here the level that shadows give alone is DEVIATIONS
+    above their middle, and above COVERED of them. With lit pixels it is the level nearest to that
+    among those with the smallest share of samples on the wrong side, within one standard error, as
+    the samples tell no better. Where the kinds leave a gap that is close above the shadows: pixels
+    dimmer than those pointed out as lit stay lit.
 
     Args:
         shadows: sampled intensities in shadow, fraction of full scale; at least one.
         lit: sampled intensities in light.
 
     Raises:
-        OptionError: no shadow is sampled.
+        OptionError: no shadow is sampled, or something that is no intensity.
     """
-    dark = np.sort(np.asarray(shadows, np.float64).ravel())
+    dark = np.asarray(shadows, np.float64).ravel()
+    bright = np.asarray([] if lit is None else lit, np.float64).ravel()
     if dark.size == 0:
         raise OptionError("no shadow pixel is sampled; at least one is needed for Ts")
-    bright = np.sort(np.asarray([] if lit is None else lit, np.float64).ravel())
+    if not all(((kind >= 0) & (kind <= 1)).all() for kind in (dark, bright)):
+        raise OptionError(
+            "a sampled intensity lies outside 0 to 1 or is not a number; "
+            "fractions of full scale, 0 to 1, are accepted"
+        )
+    aim = _aim(dark)
     if bright.size == 0:
-        return ShadowLevel(float(max(dark.mean() + 3 * dark.std(), np.nextafter(dark[-1], 1))), 0.0)
-    # an observation is shadow when i < Ts: the candidates lie between neighbouring samples
+        level = min(aim, BELOW_FULL)
+        return ShadowLevel(float(level), float((dark >= level).mean()))
+    return _part(dark, bright, aim)
+
+
+def _aim(dark: NDArray[np.float64]) -> float:
+    """The level that shadows give alone.
+
+    Their spread is read above their middle alone, where noise is not clipped at black.
+    """
+    middle, covering = np.quantile(dark, 0.5), np.quantile(dark, COVERED, method="higher")
+    above = dark[(dark > middle) & (dark <= covering)]
+    deviation = (above.mean() - middle) / MEAN_ABOVE if above.size else 0.0
+    return float(max(middle + DEVIATIONS * deviation, covering + HALF_STEP))
+
+
+def _part(dark: NDArray[np.float64], bright: NDArray[np.float64], aim: float) -> ShadowLevel:
+    """Of the levels with nearly the smallest error the one nearest to `aim`."""
+    # an observation is shadow when i < Ts: the levels in (low, high] part the samples alike
     values = np.unique(np.concatenate([dark, bright]))
-    levels = np.concatenate(
-        [[values[0]], (values[1:] + values[:-1]) / 2, [np.nextafter(values[-1], 2)]]
-    )
-    wrong_dark = 1 - np.searchsorted(dark, levels, side="left") / dark.size
-    wrong_lit = np.searchsorted(bright, levels, side="left") / bright.size
-    error = (wrong_dark + wrong_lit) / 2
-    best = np.flatnonzero(error == error.min())
-    return ShadowLevel(float(levels[best[len(best) // 2]]), float(error.min()))
+    low = np.concatenate([[-np.inf], values])
+    high = np.concatenate([values, [np.inf]])
+    missed = 1 - np.searchsorted(np.sort(dark), high, side="left") / dark.size
+    lost = np.searchsorted(np.sort(bright), high, side="left") / bright.size
+    error = (missed + lost) / 2
+    spread = np.sqrt(missed * (1 - missed) / dark.size + lost * (1 - lost) / bright.size) / 2
+    least = np.argmin(error)
+    near = error <= error[least] + spread[least] + 1e-12
+    low, high, error = low[near], high[near], error[near]
+    levels = np.clip(aim, low + np.minimum(HALF_STEP, (high - low) / 2), high)
+    nearest = np.argmin(np.abs(levels - aim))
+    return ShadowLevel(float(min(levels[nearest], BELOW_FULL)), float(error[nearest]))

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import (
-    choose,
     click_pixel,
-    colours_on_screen,
     open_canvas,
     press,
     wait_for_keys,
@@ -18,7 +16,6 @@ from browser import (
 from photolin.analysis import Options
 from photolin.factors import Factor, Thresholds
 from photolin.pipeline import analyze
-from photolin.shadow_level import sample_shadow_level
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.frame import pixel_values
@@ -63,35 +60,6 @@ def go_to(page: Any, tab: str) -> None:
 def push(page: Any, name: str) -> None:
     page.locator("button:visible").get_by_text(name, exact=True).click()
     wait_for_keys(page)
-
-
-def test_clicks_on_shadows_and_lit_pixels_set_Ts_and_Z_takes_it_back(page: Any, app: App) -> None:
-    session = enter(page, app, "Samples")
-    shadows, lit = (np.argwhere(RESULT.labels[0, 3:-3, 3:-3] == f) + 3 for f in (4, 1))
-    clicks = {"shadow": shadows[[5, -5]], "lit": lit[[100]]}
-    taken = []
-    for kind, pixels in clicks.items():
-        push(page, kind)
-        for row, column in pixels.tolist():
-            click_pixel(page, row, column)
-            wait_until(lambda r=row, c=column: (r, c, kind) in session._panels.samples.marks)  # noqa: B023
-            part = STACK.images[0, row - 2 : row + 3, column - 2 : column + 3]
-            taken.append((kind, part.ravel()))
-    both = [np.concatenate([p for k, p in taken if k == kind]) for kind in clicks]
-    expected = sample_shadow_level(*both).Ts
-    before = session._read().thresholds
-    page.get_by_text("50 shadow, 25 lit sampled").wait_for()
-    push(page, "Set Ts")
-    wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    wait_until(lambda: session._panels.thresholds._history.now.Ts == pytest.approx(expected))
-    press(page, "z")
-    wait_until(lambda: session._read().thresholds == before)
-    press(page, "Shift+Z")
-    wait_until(lambda: session._read().Ts == pytest.approx(expected))
-    assert session._pointing.pixel is None  # these clicks select nothing
-    push(page, "stop")
-    click_pixel(page, 20, 30)
-    wait_until(lambda: session._pointing.pixel == (20, 30))
 
 
 def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any, app: App) -> None:
@@ -154,31 +122,6 @@ def test_a_panel_out_of_view_is_not_drawn_and_up_to_date_once_it_is_opened(
     page.get_by_text("Pixel row 20, column 30.").wait_for()
     go_to(page, "Tune")
     wait_until(lambda: not session._panels.diagnosis._shown)
-
-
-def test_two_pictures_are_split_at_the_divider_or_subtracted(page: Any, app: App) -> None:
-    session = enter(page, app, "Compare")
-    one = colours_on_screen(page, (48, 64)).astype(int)
-    view = session._panels.compare
-    choose(page, view._against, "linearized")
-    wait_until(lambda: session._read().against == "linearized")
-    page.get_by_text("Left: input by robust. Right: linearized by robust.").wait_for()
-
-    def apart() -> tuple[int, int]:
-        """Largest difference to the first picture in its half, and in the other."""
-        shown = colours_on_screen(page, (48, 64)).astype(int)
-        return abs(shown - one)[:, :30].max(), abs(shown - one)[:, 34:].max()
-
-    wait_until(lambda: apart()[0] <= 1)
-    assert apart()[1] > 20
-    press(page, "b")  # all of one
-    wait_until(lambda: max(apart()) <= 1)
-    press(page, "b")  # all of the other
-    wait_until(lambda: min(apart()) > 20)
-    choose(page, view._against, "input")
-    view._difference.value = True
-    session._wake.set()
-    wait_until(lambda: colours_on_screen(page, (48, 64)).max() == 0)
 
 
 def test_a_click_on_the_map_moves_both_sliders(page: Any, app: App) -> None:

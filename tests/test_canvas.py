@@ -22,6 +22,7 @@ from browser import (
 )
 
 from webapp.access import Server, open_server
+from webapp.box import Box
 from webapp.canvas import Canvas, Window, pixel_in_text, window_in_text
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -95,6 +96,7 @@ class Stage:
     hovers: list[tuple[int, int] | None] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
     windows: list[Window] = field(default_factory=list)
+    boxes: list[Box] = field(default_factory=list)
     connected: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
 
     def connect(self, client: viser.ClientHandle) -> None:
@@ -104,6 +106,7 @@ class Stage:
         self.canvas.on_hover(self.hovers.append)
         self.canvas.on_key(self.keys.append)
         self.canvas.on_view(self.windows.append)
+        self.canvas.on_box(self.boxes.append)
         self.slider = client.gui.add_slider("T", 0.0, 1.0, 0.01, 0.5)
         client.gui.add_text("Note", "")
         self.connected.release()
@@ -335,3 +338,147 @@ def test_the_page_reports_which_part_of_the_picture_is_in_view(
 
     stage.canvas.fit()
     wait_until(lambda: stage.windows[-1][:4] == (0, 300, 0, 400))
+
+
+def drag(page: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Press at (row, column), go to another place, and hold."""
+    page.mouse.move(*place_of(page, *start))
+    page.mouse.down()
+    page.mouse.move(*place_of(page, *end), steps=4)
+
+
+def start_sampling(page: Any, stage: Stage) -> None:
+    stage.canvas.set_sampling("#cc79a7")
+    page.wait_for_function("window.__viserMutable.canvas.style.cursor === 'crosshair'")
+
+
+def outline(page: Any, name: str) -> tuple[float, float, float, float]:
+    """(row0, row1, column0, column1) that an element covers on the picture."""
+    box = page.wait_for_selector(name).bounding_box()
+    scale, left, top = similarity(page)
+    rows = [(box["y"] - top) / scale, (box["y"] + box["height"] - top) / scale]
+    columns = [(box["x"] - left) / scale, (box["x"] + box["width"] - left) / scale]
+    return rows[0], rows[1], columns[0], columns[1]
+
+
+@pytest.mark.browser
+def test_a_drag_while_sampling_draws_a_rectangle_and_the_picture_stays(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(60, 80)
+    view = similarity(page)
+    start_sampling(page, stage)
+    drag(page, (12.5, 50.5), (40.5, 20.5))  # from the upper right to the lower left
+    assert outline(page, ".photolin-band") == pytest.approx((12, 41, 20, 51), abs=0.1)
+    page.mouse.up()
+    wait_until(lambda: stage.boxes == [Box(12, 41, 20, 51)])
+    page.wait_for_selector(".photolin-band", state="hidden")
+    assert similarity(page) == pytest.approx(view, abs=1e-6)
+    assert stage.picks == []
+    click_pixel(page, 7, 9)
+    wait_until(lambda: stage.picks == [(7, 9)])
+    drag(page, (55.5, 30.5), (70, 10.5))  # beyond the border
+    page.mouse.up()
+    wait_until(lambda: stage.boxes[1:] == [Box(55, 60, 10, 31)])
+
+
+@pytest.mark.browser
+def test_a_rectangle_beside_the_picture_or_given_up_is_none(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(60, 60)
+    view = similarity(page)
+    start_sampling(page, stage)
+    drag(page, (10, -6), (30, -2))
+    page.mouse.up()
+    drag(page, (10.5, 10.5), (30.5, 30.5))
+    page.keyboard.press("Escape")
+    page.wait_for_selector(".photolin-band", state="hidden")
+    page.mouse.up()
+    drag(page, (20.5, 20.5), (22.5, 25.5))
+    stage.canvas.set_sampling(None)
+    page.wait_for_function("window.__viserMutable.canvas.style.cursor === ''")
+    page.mouse.up()
+    start_sampling(page, stage)
+    drag(page, (3.5, 3.5), (4.5, 4.5))
+    page.mouse.up()
+    wait_until(lambda: len(stage.boxes) > 0)
+    assert stage.boxes == [Box(3, 5, 3, 5)]
+    assert stage.keys == []  # Escape was about the rectangle
+    assert similarity(page) == pytest.approx(view, abs=1e-6)
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("how", ["off", "Shift", "right", "middle"])
+def test_a_drag_pans_with_sampling_off_with_shift_and_with_other_buttons(
+    page: Any, open_stage: OpenStage, how: str
+) -> None:
+    stage = open_stage(60, 80)
+    start_sampling(page, stage)
+    drag(page, (3.5, 3.5), (4.5, 4.5))  # what it leaves behind must not hold the picture
+    page.mouse.up()
+    wait_until(lambda: len(stage.boxes) == 1)
+    if how == "off":
+        stage.canvas.set_sampling(None)
+        page.wait_for_function("window.__viserMutable.canvas.style.cursor === ''")
+    if how == "Shift":
+        page.keyboard.down(how)
+    scale, left, top = similarity(page)
+    button = how if how in ("right", "middle") else "left"
+    page.mouse.move(500, 400)
+    page.mouse.down(button=button)
+    page.mouse.move(560, 430, steps=4)
+    page.mouse.up(button=button)
+    assert similarity(page) == pytest.approx((scale, left + 60, top + 30), abs=0.5)
+    assert len(stage.boxes) == 1
+
+
+@pytest.mark.browser
+def test_in_3d_a_drag_turns_and_takes_nothing(page: Any, open_stage: OpenStage) -> None:
+    stage = open_stage(60, 80)
+    stage.canvas.set_boxes([(Box(5, 9, 5, 9), "#009e73")])
+    start_sampling(page, stage)
+    page.wait_for_selector(".photolin-box")
+    stage.canvas.set_orbit(True)
+    page.wait_for_selector(".photolin-box", state="hidden")
+    before = camera_rotation(page)
+    page.mouse.move(500, 400)
+    page.mouse.down()
+    page.mouse.move(560, 430, steps=4)
+    page.mouse.up()
+    wait_until(lambda: np.abs(camera_rotation(page) - before).max() > 0.01)
+    stage.canvas.set_orbit(False)
+    page.wait_for_selector(".photolin-box")
+    drag(page, (3.5, 3.5), (4.5, 4.5))
+    page.mouse.up()
+    wait_until(lambda: stage.boxes == [Box(3, 5, 3, 5)])
+
+
+@pytest.mark.browser
+def test_boxes_are_outlined_where_they_are_even_small_ones(
+    page: Any, open_stage: OpenStage
+) -> None:
+    stage = open_stage(60, 80)
+    stage.canvas.set_boxes([(Box(5, 25, 30, 70), "#cc79a7")])
+    assert outline(page, ".photolin-box") == pytest.approx((5, 25, 30, 70), abs=0.1)
+    colour = page.evaluate(
+        "getComputedStyle(document.querySelector('.photolin-box')).borderTopColor"
+    )
+    assert colour == "rgb(204, 121, 167)"
+    page.mouse.move(400, 300)
+    page.mouse.wheel(0, -600)
+    wait_until(lambda: similarity(page)[0] > 12)
+    assert outline(page, ".photolin-box") == pytest.approx((5, 25, 30, 70), abs=0.1)
+    page.keyboard.press("f")
+    for _ in range(6):
+        page.mouse.wheel(0, 600)
+    wait_until(lambda: similarity(page)[0] < 6)
+    stage.canvas.set_boxes([(Box(40, 41, 7, 8), "#009e73")])
+    page.wait_for_function(
+        "document.querySelector('.photolin-box')?.style.borderColor === 'rgb(0, 158, 115)'"
+    )
+    row0, row1, column0, column1 = outline(page, ".photolin-box")
+    assert (row0 + row1, column0 + column1) == pytest.approx((81, 15), abs=0.2)
+    assert (row1 - row0) * similarity(page)[0] == pytest.approx(7, abs=0.1)
+    stage.canvas.set_boxes([])
+    page.wait_for_selector(".photolin-box", state="detached")

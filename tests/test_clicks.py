@@ -10,7 +10,7 @@ import viser
 from browser import wait_until
 
 from webapp.access import Server, open_server
-from webapp.clicks import Click, Clicks, Sight, event_in_text
+from webapp.clicks import Click, Clicks, Drag, Sight, event_in_text
 
 
 @pytest.mark.parametrize(
@@ -18,11 +18,12 @@ from webapp.clicks import Click, Clicks, Sight, event_in_text
     [
         ("1 map 0.5000,0.2500", Click("map", 0.5, 0.25)),
         ("999999999 a-b 0.0,1.0000", Click("a-b", 0, 1)),
+        ("2 map by -0.2500,1.0000", Drag("map", -0.25, 1)),
         ("7 map shown", Sight("map", True)),
         ("8 map hidden", Sight("map", False)),
     ],
 )
-def test_an_event_is_read_as_the_page_writes_it(text: str, event: Click | Sight) -> None:
+def test_an_event_is_read_as_the_page_writes_it(text: str, event: Click | Drag | Sight) -> None:
     assert event_in_text(text) == event
 
 
@@ -37,7 +38,16 @@ def test_an_event_is_read_as_the_page_writes_it(text: str, event: Click | Sight)
         "1 map 1.5,0.5",
         "1 map 0.5,1.0001",
         "1 map -0.5,0.5",
+        "1 map -0.0,0.5",
         "1 map nan,0.5",
+        "1 map by 0.5",
+        "1 map by -1.5,0.5",
+        "1 map by 0.5,1.0001",
+        "1 map by by 0.5,0.5",
+        "1 map by --0.5,0.5",
+        "1 map by 0.5,0.5\n",
+        "1 map by nan,0.5",
+        "1 map by shown",
         "1 map 1e0,0.5",
         "1 map 0.5,0.5\n",
         " 1 map 0.5,0.5",
@@ -72,17 +82,19 @@ class Stage:
     server: Server
     html: Any = None
     clicks: list[tuple[float, float]] = field(default_factory=list)
+    drags: list[tuple[float, float]] = field(default_factory=list)
     sights: list[bool] = field(default_factory=list)
     connected: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
 
     def connect(self, client: viser.ClientHandle) -> None:
-        watch = Clicks(client).watch
+        clicks = Clicks(client)
         tabs = client.gui.add_tab_group()
         with tabs.add_tab("One"):
             client.gui.add_html("first")
         with tabs.add_tab("Two"):
             self.html = client.gui.add_html("")
-        name = watch("map", lambda x, y: self.clicks.append((x, y)), self.sights.append)
+        name = clicks.watch("map", lambda x, y: self.clicks.append((x, y)), self.sights.append)
+        assert clicks.drag("map", lambda x, y: self.drags.append((x, y))) == name
         self.html.content = BOX.format(name)
         self.connected.release()
 
@@ -128,6 +140,36 @@ def test_clicks_and_sights_are_told_also_after_the_content_was_replaced(
     assert stage.clicks[3] == pytest.approx((0.5, 0.5), abs=0.01)
     page.get_by_role("tab", name="One").click()
     wait_until(lambda: stage.sights == [True, False])
+
+
+@pytest.mark.browser
+@pytest.mark.filterwarnings("error")
+def test_steps_of_a_drag_add_up_to_the_way_of_the_pointer_also_beyond_the_element(
+    page: Any, stage: Stage
+) -> None:
+    page.get_by_role("tab", name="Two").click()
+    wait_until(lambda: stage.sights == [True])
+    box = page.locator("#photolin-map").bounding_box()
+    at = [(0.5, 0.5), (0.7, 0.4), (0.2, 0.9), (-0.1, 1.2)]
+    places = [(box["x"] + x * box["width"], box["y"] + y * box["height"]) for x, y in at]
+    page.mouse.move(*places[0])
+    page.mouse.down()
+    for count, place in enumerate(places[1:], 1):
+        page.mouse.move(*place)
+        page.wait_for_timeout(80)
+        stage.html.content = f"<p>{count}</p>{BOX.format('photolin-map')}"
+        page.get_by_text(str(count), exact=True).wait_for()
+    page.mouse.up()
+    page.mouse.move(*places[0])  # nothing is held any more
+
+    def way() -> list[float]:
+        return [sum(step[axis] for step in stage.drags) for axis in (0, 1)]
+
+    wait_until(lambda: way() == pytest.approx([-0.6, 0.7], abs=0.01))
+    assert len(stage.drags) >= 2
+    press(page, 0.5, 0.5)
+    wait_until(lambda: len(stage.clicks) == 1)
+    assert way() == pytest.approx([-0.6, 0.7], abs=0.01)
 
 
 @pytest.mark.browser

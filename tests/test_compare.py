@@ -7,17 +7,18 @@ import pytest
 
 from photolin import Options, analyze, render_scene
 from photolin.factors import PALETTE, Factor
-from webapp.compare import LINE, differ, lay_over, other_frame, split
+from webapp.compare import LINE, differ, lay_over, lay_together, mixture, other_frame, split
 from webapp.frame import Frame, compose
 from webapp.runs import Runs
 from webapp.state import ViewState
 
-STACK = render_scene("sphere_cone", size=(24, 30), images=8).stack
+SCENE = render_scene("sphere_cone", size=(24, 30), images=8)
+STACK = SCENE.stack
 RESULTS = {
     "robust": analyze(STACK),
     "classification": analyze(STACK, Options(method="classification", samples=50)),
 }
-RUNS = Runs(STACK, Options())
+RUNS = Runs(STACK, Options(), truth=SCENE.truth.labels)
 
 
 def frame(**state: object) -> Frame:
@@ -71,11 +72,70 @@ def test_half_opaque_labels_mix_with_the_picture() -> None:
     assert np.abs(over[cast].astype(float) - expected).max() <= 1
 
 
+def other_of(**state: object) -> Frame:
+    found = other_frame(frame(**state))
+    assert found is not None
+    return found
+
+
 def test_compared_is_the_method_beside_where_there_is_one() -> None:
-    f = frame(beside="classification")
-    other = other_frame(f, "labels")
+    f = frame(beside="classification", against="labels")
+    other = other_of(beside="classification", against="labels")
     assert other.analysis is RESULTS["classification"]
     np.testing.assert_array_equal(other.labels, f.beside_labels)
-    alone = other_frame(frame(), "residual")
+    alone = other_of(against="residual")
     assert alone.analysis is RESULTS["robust"]
     assert alone.state.layer == "residual"
+    assert other_frame(frame()) is None
+
+
+def test_the_truth_is_the_map_of_the_image_shown_and_nothing_where_it_is_not_known() -> None:
+    other = other_of(against="truth", image=5, beside="classification")
+    np.testing.assert_array_equal(other.labels, SCENE.truth.labels[5])
+    assert other.state.layer == "labels"
+    assert other.analysis is None
+    unknown = compose(Runs(STACK, Options()), RESULTS, ViewState(against="truth"))
+    assert other_frame(unknown) is None
+
+
+@pytest.mark.parametrize("arrangement", ["split", "left", "right"])
+def test_both_are_laid_into_one_picture_as_they_are_arranged(arrangement: str) -> None:
+    state = {"against": "truth", "arrangement": arrangement, "divider": 0.4, "opacity": 1.0}
+    picture, legend = lay_together(frame(**state), other_of(**state))
+    first, second = frame(**state).labels, SCENE.truth.labels[0]
+    assert first is not None
+    at = {"split": 12, "left": 30, "right": 0}[arrangement]
+    shown = np.concatenate([first[:, :at], second[:, at:]], axis=1)
+    beside_line = np.arange(30) != (at - 1 if arrangement == "split" else -1)
+    for factor in Factor:
+        assert (picture[(shown == factor) & beside_line] == PALETTE[factor]).all()
+    assert legend.startswith("left: input")
+
+
+def test_layers_that_cannot_be_subtracted_show_how_far_their_pictures_are_apart() -> None:
+    state = {"layer": "input", "against": "input", "arrangement": "difference"}
+    alone = compose(RUNS, {}, replace(ViewState(), **state))  # type: ignore[arg-type]
+    other = other_frame(alone)
+    assert other is not None
+    picture, legend = lay_together(alone, other)
+    assert (picture == 0).all()
+    assert "black is equal" in legend
+
+
+def test_what_decides_a_joined_picture_is_in_its_key() -> None:
+    base = {"against": "truth", "arrangement": "split"}
+    keys = [
+        mixture(frame(**state), other_of(**state))
+        for state in (
+            base,
+            {**base, "divider": 0.25},
+            {**base, "arrangement": "difference"},
+            {**base, "against": "labels"},
+            {**base, "opacity": 0.1},
+            {**base, "against": "labels", "beside": "classification"},
+        )
+    ]
+    assert len(set(keys)) == len(keys)
+    still = {**base, "arrangement": "difference"}
+    moved = {**still, "divider": 0.9}
+    assert mixture(frame(**still), other_of(**still)) == mixture(frame(**moved), other_of(**moved))

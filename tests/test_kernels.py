@@ -13,10 +13,12 @@ from test_factors import SETTINGS, plane
 from photolin.consensus import stopping_table
 from photolin.factors import OUTSIDE, Thresholds, classify
 from photolin.kernels import (
+    centre_path,
     centre_rows,
     consensus_rows,
     evidence_rows,
     label_rows,
+    score_candidates,
     support_rows,
 )
 from photolin.kernels.consensus import UNFIT
@@ -148,6 +150,43 @@ def test_candidates_that_coincide_are_their_own_centre() -> None:
     out = np.empty((10, 3), f32)
     centre_rows(X.astype(f32), triples, inverses, 3, out, 0, 10)
     np.testing.assert_allclose(out, V, atol=2e-4)
+
+
+def test_the_path_ends_at_the_centre_and_each_step_is_of_fewer_candidates() -> None:
+    X, A, _ = problem(3, 1, 30)
+    triples, inverses = samples(4, A, 60)
+    v = np.einsum("nij,nj->ni", inverses, X[0][triples]).astype(f64)
+    path, counts = np.full((60, 3), 7.0), np.full(60, 7)
+    steps = centre_path(v.copy(), 5, path, counts)
+    assert counts[0] == 60
+    assert steps > 1
+    for step in range(steps):
+        assert len(v) == counts[step]
+        np.testing.assert_allclose(path[step], v.mean(axis=0), rtol=1e-9)
+        distance = np.linalg.norm(v - v.mean(axis=0), axis=1)
+        v = v[distance <= distance.mean()]
+    out = np.empty((1, 3), f32)
+    centre_rows(X, triples, inverses, 5, out, 0, 1)
+    np.testing.assert_allclose(path[steps - 1], out[0], rtol=1e-5)
+    assert (path[steps:] == 7).all()
+
+
+# Scores of given candidates
+
+
+def test_scores_of_candidates_are_those_of_classify_and_only_in_their_range() -> None:
+    X, A, V = problem(8, 1, 400)
+    lit = X[0] >= f32(0.02)
+    x, A = X[0, lit], np.ascontiguousarray(A[:, lit])
+    v = V + np.random.default_rng(9).normal(size=(50, 3)).astype(f32) / 20
+    diffuse, score = np.full(50, 7, np.int32), np.full(50, 7, np.int32)
+    score_candidates(x, A, v, f32(0.05), diffuse, score, 3, 48)
+    l = v[:, :1] * A[0] + v[:, 1:2] * A[1] + v[:, 2:] * A[2]
+    labels = classify(x, l, Thresholds(0.05, 0.02))
+    D, U = ((labels == code).sum(axis=1)[3:48] for code in (1, 0))
+    np.testing.assert_array_equal(diffuse[3:48], D)
+    np.testing.assert_array_equal(score[3:48], D - U)
+    assert (score[[0, 2, 48, 49]] == 7).all()
 
 
 # Adaptive consensus

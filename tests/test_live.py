@@ -13,7 +13,16 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp import live as module
 from webapp.canvas import Window
-from webapp.live import MOST_PIXELS, Live, Part, Preview, choose_part, cut, is_behind
+from webapp.live import (
+    MOST_OBSERVATIONS,
+    MOST_PIXELS,
+    Live,
+    Part,
+    Preview,
+    choose_part,
+    cut,
+    is_behind,
+)
 from webapp.state import ViewState
 
 K, H, W = 8, 48, 64
@@ -43,7 +52,7 @@ def preview_of(part: Part) -> Preview:
 def test_a_small_picture_is_followed_as_a_whole_whatever_is_seen_of_it(
     shape: tuple[int, int], window: Window | None
 ) -> None:
-    assert choose_part(shape, window) == Part(0, shape[0], 0, shape[1], 1)
+    assert choose_part((9, *shape), window) == Part(0, shape[0], 0, shape[1], 1)
 
 
 @pytest.mark.parametrize(
@@ -59,11 +68,11 @@ def test_a_small_picture_is_followed_as_a_whole_whatever_is_seen_of_it(
 def test_a_large_picture_is_followed_where_it_is_seen_as_finely_as_the_screen_shows(
     window: Window, part: Part
 ) -> None:
-    assert choose_part((2000, 3000), window) == part
+    assert choose_part((9, 2000, 3000), window) == part
 
 
 def test_a_large_picture_of_which_no_window_is_known_is_thinned_out() -> None:
-    assert choose_part((2000, 3000), None) == Part(0, 2000, 0, 3000, 5)
+    assert choose_part((9, 2000, 3000), None) == Part(0, 2000, 0, 3000, 5)
 
 
 def random_windows(count: int) -> list[tuple[tuple[int, int], Window]]:
@@ -82,7 +91,7 @@ def random_windows(count: int) -> list[tuple[tuple[int, int], Window]]:
 def test_the_part_covers_the_window_with_no_more_pixels_than_can_be_followed() -> None:
     thinned = 0
     for shape, window in random_windows(2000):
-        part = choose_part(shape, window)
+        part = choose_part((9, *shape), window)
         assert 0 <= window.row0 - part.row0 < part.step
         assert 0 <= window.column0 - part.column0 < part.step
         assert (part.row1, part.column1) == (window.row1, window.column1)
@@ -99,10 +108,12 @@ def test_the_part_covers_the_window_with_no_more_pixels_than_can_be_followed() -
 
 def test_a_window_moved_by_less_than_a_step_looks_at_the_same_pixels() -> None:
     for shape, window in random_windows(2000):
-        part = choose_part(shape, window)
+        part = choose_part((9, *shape), window)
         assert (part.row0 % part.step, part.column0 % part.step) == (0, 0)
         by = min(part.step - 1, shape[0] - window.row1)
-        moved = choose_part(shape, window._replace(row0=window.row0 + by, row1=window.row1 + by))
+        moved = choose_part(
+            (9, *shape), window._replace(row0=window.row0 + by, row1=window.row1 + by)
+        )
         assert (moved.step, moved.column0) == (part.step, part.column0)
         assert moved.row0 - part.row0 in (0, part.step)
 
@@ -223,7 +234,7 @@ def test_what_is_asked_again_is_the_same_preview(monkeypatch: pytest.MonkeyPatch
         assert all(preview is not earlier for earlier in found)
         assert preview.near is near
         assert preview.analysis.thresholds == state.thresholds
-        assert preview.part == choose_part((H, W), seen_part)
+        assert preview.part == choose_part((9, H, W), seen_part)
         rows, columns = preview.part.place
         np.testing.assert_array_equal(preview.analysis.mask, MASK[rows, columns])
         found.append(preview)
@@ -256,5 +267,13 @@ def test_a_preview_can_be_cancelled_and_asked_for_again() -> None:
 
 
 def test_a_window_of_hardly_any_scale_asks_for_no_more_than_the_picture_has() -> None:
-    part = choose_part((800, 700), Window(5, 800, 3, 700, 1e-7))
+    part = choose_part((9, 800, 700), Window(5, 800, 3, 700, 1e-7))
     assert part == Part(0, 800, 0, 700, 800)
+
+
+def test_a_stack_of_many_images_is_thinned_out_more() -> None:
+    few, many = (choose_part((K, 500, 500), None) for K in (12, 96))
+    assert few.step == 1
+    assert many.step == 2
+    rows, columns = (len(range(*s.indices(10**6))) for s in many.place)
+    assert 96 * rows * columns <= MOST_OBSERVATIONS

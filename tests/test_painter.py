@@ -28,11 +28,31 @@ RECOVERED = Recovered(recover_shape(STACK, RESULT, resolve_ambiguity(RESULT)), R
 
 
 @dataclass
+class FakeSecond:
+    """Remembers what it was told of the second picture."""
+
+    calls: list[tuple[str, Any]]
+
+    def set_base(self, encoded: bytes, image_format: str) -> None:
+        self.calls.append((f"other {image_format}", decode(encoded)))
+
+    def set_overlay(self, encoded: bytes | None) -> None:
+        self.calls.append(("other overlay", None if encoded is None else decode(encoded)))
+
+    def arrange(self, arrangement: str | None, divider: float) -> None:
+        self.calls.append(("arrangement", (arrangement, divider)))
+
+
+@dataclass
 class FakeCanvas:
     """Remembers what it was told."""
 
     calls: list[tuple[str, Any]] = field(default_factory=list)
     readout: str = ""
+
+    @property
+    def second(self) -> FakeSecond:
+        return FakeSecond(self.calls)
 
     def set_base(self, encoded: bytes, image_format: str) -> None:
         self.calls.append((f"base {image_format}", decode(encoded)))
@@ -63,7 +83,8 @@ class FakeCanvas:
 
     def take(self) -> dict[str, Any]:
         """What was drawn since the last look, by part; no part twice."""
-        calls, self.calls = self.calls, []
+        calls = list(self.calls)
+        self.calls.clear()
         assert len({name for name, _ in calls}) == len(calls)
         return dict(calls)
 
@@ -312,3 +333,101 @@ def test_captions_of_a_shape_say_nothing_of_labels(painter: Painter, canvas: Fak
     )
     assert canvas.readout.startswith("normals: red x right")
     assert "labels" not in canvas.readout
+
+
+BOTH = {"against": "residual", "layer": "input"}
+
+
+def test_a_second_picture_is_drawn_once_and_the_line_costs_no_picture(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    painter.paint(frame(), None, rested=True)
+    first = canvas.take()
+    painter.paint(frame(**BOTH), None, rested=True)
+    drawn = canvas.take()
+    assert set(drawn) == {"other png", "other overlay", "arrangement"}
+    assert drawn["arrangement"] == ("split", 0.5)
+    assert np.array_equal(drawn["other png"], render_layer(frame(layer="residual"))[0])
+    assert drawn["other overlay"] is None
+    assert canvas.readout.startswith("left: robust, input\nright: robust, residual, blue -")
+    for state in ({"divider": 0.2}, {"arrangement": "side by side"}, {"arrangement": "left"}):
+        painter.paint(frame(**BOTH, **state), None, rested=True)
+        assert set(canvas.take()) == {"arrangement"}
+    assert canvas.readout == "left: robust, input"
+    painter.paint(frame(), None, rested=True)
+    assert canvas.take() == {"arrangement": (None, 0.0)}
+    assert set(first) == {"base png", "overlay", "marker"}
+
+
+def test_a_difference_is_one_picture_without_labels(painter: Painter, canvas: FakeCanvas) -> None:
+    state = {"layer": "input", "against": "linearized", "arrangement": "difference"}
+    painter.paint(frame(**state), None, rested=True)
+    drawn = canvas.take()
+    assert set(drawn) == {"base png", "overlay", "marker"}
+    residual, _ = render_layer(frame(layer="residual"))
+    assert np.array_equal(drawn["base png"], residual)
+    assert drawn["overlay"] is None
+    assert canvas.readout.startswith("left minus right, blue -")
+    painter.paint(frame(), None, rested=True)
+    again = canvas.take()
+    assert np.array_equal(again["base png"], render_layer(frame())[0])
+    assert again["overlay"] is not None
+
+
+def test_true_labels_take_the_place_of_computed_ones_and_the_pointer_reads_both(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    truth = np.full(STACK.shape, Factor.CAST, np.uint8)
+    runs = Runs(STACK, Options(), truth=truth)
+
+    def draw(**state: Any) -> dict[str, Any]:
+        shown = ViewState(T=0.05, Ts=0.02, **state)
+        painter.paint(compose(runs, {"robust": RESULT}, shown), (3, 4), rested=True)
+        return canvas.take()
+
+    assert len(np.unique(draw(against="labels")["other overlay"][..., :3], axis=0)) > 1
+    drawn = draw(against="truth")["other overlay"]
+    assert (drawn == (*PALETTE[Factor.CAST], 255)).all()
+    assert canvas.readout.startswith("left:  row 3  column 4  i ")
+    assert canvas.readout.endswith("\nright: truth C")
+    draw(against="residual")
+    left, right = canvas.readout.split("\n")
+    assert left.removeprefix("left:  ") == right.removeprefix("right: ")
+
+
+def test_on_the_surface_both_are_one_picture(painter: Painter, canvas: FakeCanvas) -> None:
+    shown = ViewState(T=0.05, Ts=0.02, relief=True, against="linearized", divider=0.5)
+    composed = compose(Runs(STACK, Options()), {"robust": RESULT}, shown, None, RECOVERED)
+    painter.paint(composed, None, rested=True)
+    drawn = canvas.take()
+    assert not {"arrangement", "other png"} & set(drawn)
+    right = render_layer(frame(layer="linearized"))[0]
+    assert np.array_equal(drawn["base png"][:, 16:, 0], right[:, 16:])
+
+
+def test_a_rough_second_picture_is_made_exact_too(
+    painter: Painter, canvas: FakeCanvas, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LARGE", 100)
+    assert painter.paint(frame(**BOTH), None, rested=False) is True
+    assert {"base jpeg", "other jpeg"} <= set(canvas.take())
+    assert painter.paint(frame(**BOTH), None, rested=True) is False
+    assert set(canvas.take()) == {"base png", "other png"}
+
+
+def test_before_there_is_a_result_the_truth_alone_has_labels(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    runs = Runs(STACK, Options(), truth=np.full(STACK.shape, Factor.CAST, np.uint8))
+
+    def draw(against: Any, pointer: tuple[int, int] | None) -> dict[str, Any]:
+        shown = ViewState(T=0.05, Ts=0.02, against=against)
+        painter.paint(compose(runs, {}, shown), pointer, rested=True)
+        return canvas.take()
+
+    assert draw("labels", (3, 4))["other overlay"] is None
+    assert canvas.readout == f"row 3  column 4  i {STACK.images[0, 3, 4]:.3f}"
+    draw("labels", None)
+    assert canvas.readout == "left: robust, input\nright: robust, labels"
+    assert (draw("truth", None)["other overlay"] == (*PALETTE[Factor.CAST], 255)).all()
+    assert canvas.readout == "left: robust, input\nright: truth"

@@ -22,7 +22,7 @@ def test_every_field_changes_the_state():
         "image": 1, "layer": "residual", "method": "statistical", "T": 0.1, "Ts": 0.1,
         "opacity": 0.3, "shown": frozenset(), "outlines": True, "pixel": (0, 0), "gain": 2.0,
         "live": False, "encoding": "exact (PNG)", "beside": "statistical",
-        "against": "input", "divider": 0.2, "difference": True, "pins": ((1, 2),),
+        "against": "truth", "divider": 0.2, "arrangement": "left", "pins": ((1, 2),),
         "relief": True, "arrows": False, "light": (0.1, 0.2),
     }  # fmt: skip
     assert set(changed) == set(asdict(ViewState()))
@@ -60,6 +60,15 @@ def test_each_layer_is_accepted(layer):
         (
             {"method": "best"},
             "method is 'best'; accepted are robust, classification, statistical",
+        ),
+        (
+            {"against": "bases"},
+            "against is 'bases'; accepted are input, linearized, residual, labels, albedo, "
+            "normals, depth, relit, truth",
+        ),
+        (
+            {"arrangement": "over"},
+            "arrangement is 'over'; accepted are split, side by side, difference, left, right",
         ),
         ({"divider": 1.1}, "divider is 1.1; accepted is 0 to 1"),
         (

@@ -11,6 +11,7 @@ from .keeper import Keeper
 from .selections import Selections
 from .session import Session
 from .source import Source
+from .start import start_from
 
 
 class App:
@@ -29,6 +30,8 @@ class App:
         """What is to be said to the next tab, as there was none."""
         self.server: Server = open_server(host, port)
         self._keeper = Keeper(source.place, source.stack.shape, self._tell)
+        self._found = self._keeper.latest
+        """What an earlier program kept."""
         self.server.server.on_client_connect(self._attach)
         self.server.server.on_client_disconnect(self._detach)
 
@@ -52,7 +55,13 @@ class App:
             session.notices.say("Session", sentence, "red")
 
     def _attach(self, client: viser.ClientHandle) -> None:
-        session = Session(client, self._selections, self._keeper)
+        kept = self._keeper.latest
+        if kept is None or kept is self._found:  # not set since the command line was given
+            start = start_from(self._selections.source, kept)
+        else:
+            start = kept
+        again = kept is not None
+        session = Session(client, self._selections, self._keeper, start, again=again)
         with self._lock:
             self._sessions[client.client_id] = session
             untold, self._untold = self._untold, []

@@ -18,7 +18,9 @@ import viser
 
 from photolin.shape.recover import Shape
 
+from .box import Box, box_in_text
 from .relief import MESH, Relief
+from .second import PLANES, Second
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -62,11 +64,12 @@ class Canvas:
         )
         # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
         # screens with more than one pixel in it: the page writes them into hidden fields.
-        self._hover, self._pick, self._key, self._view, self._light = (
+        self._hover, self._pick, self._key, self._view, self._light, self._band = (
             client.gui.add_text(name, "", visible=False)
-            for name in ("hover", "pick", "key", "view", "light")
+            for name in ("hover", "pick", "key", "view", "light", "band")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
+        self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
         run_javascript(client, _javascript())
         options = {
             "rows": height,
@@ -79,6 +82,9 @@ class Canvas:
             "keyId": widget_id(self._key),
             "viewId": widget_id(self._view),
             "lightId": widget_id(self._light),
+            "others": PLANES,
+            "dividerId": self.second.divider_id,
+            "bandId": widget_id(self._band),
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -120,6 +126,18 @@ class Canvas:
         """Show the ball on which a light is dragged, at x right, y up; None hides it."""
         call_javascript(self._client, "window.photolin.setLight", light)
 
+    def set_sampling(self, colour: str | None) -> None:
+        """Let drags draw rectangles of a CSS colour "#rrggbb"; None: they move the picture again.
+
+        With Shift or another button they still move it; in 3D nothing is drawn.
+        """
+        call_javascript(self._client, "window.photolin.setSampling", colour)
+
+    def set_boxes(self, boxes: Sequence[tuple[Box, str]]) -> None:
+        """Outline boxes of pixels in CSS colours, in place of the earlier ones; not in 3D."""
+        listed = [(*box, colour) for box, colour in boxes]
+        call_javascript(self._client, "window.photolin.setBoxes", listed)
+
     def set_readout(self, text: str) -> None:
         """Write one line in the lower left corner; an empty text removes it."""
         if text != self._readout:
@@ -152,6 +170,14 @@ class Canvas:
         @self._hover.on_update
         async def _(_: viser.GuiEvent) -> None:
             callback(self._pixel(self._hover.value))
+
+    def on_box(self, callback: Callable[[Box], object]) -> None:
+        """Call back with each rectangle that was drawn; see `set_sampling`."""
+
+        @self._band.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if box := box_in_text(self._band.value.partition(" ")[2], self._shape):
+                callback(box)
 
     def on_view(self, callback: Callable[[Window], None]) -> None:
         """Call back with the part of the picture on screen, once it has come to rest."""

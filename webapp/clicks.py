@@ -1,4 +1,4 @@
-"""Clicks on parts of the panel, as fractions of their size, and whether they are in view.
+"""Clicks and drags on parts of the panel, as fractions of their size, and whether they are in view.
 
 Pictures in viser's panel tell no clicks, and tabs do not tell when they are opened. `clicks.js`
 looks for elements by id in the page and writes what happens into one hidden field. The elements may
@@ -28,6 +28,16 @@ class Click(NamedTuple):
     """From its upper border to its lower, 0 to 1."""
 
 
+class Drag(NamedTuple):
+    """The pointer moved while it held an element."""
+
+    name: str
+    right: float
+    """By how much of its width, -1 to 1."""
+    down: float
+    """By how much of its height, -1 to 1."""
+
+
 class Sight(NamedTuple):
     """An element came into view or went out of it."""
 
@@ -41,6 +51,7 @@ class Clicks:
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
         self._clicked: dict[str, Callable[[float, float], None]] = {}
+        self._dragged: dict[str, Callable[[float, float], None]] = {}
         self._seen: dict[str, Callable[[bool], None]] = {}
         self._field = client.gui.add_text("clicks", "", visible=False)
         run_javascript(client, _javascript())
@@ -51,6 +62,8 @@ class Clicks:
             match event_in_text(self._field.value):
                 case Click(name, x, y) if name in self._clicked:
                     self._clicked[name](x, y)
+                case Drag(name, right, down) if name in self._dragged:
+                    self._dragged[name](right, down)
                 case Sight(name, shown) if name in self._seen:
                     self._seen[name](shown)
 
@@ -76,23 +89,42 @@ class Clicks:
         """`watch` without clicks."""
         return self.watch(name, _ignore, seen)
 
+    def drag(self, name: str, dragged: Callable[[float, float], None]) -> str:
+        """Call back while an element is dragged, up to 20 times a second.
+
+        Args:
+            name: as `watch` takes it.
+            dragged: called with how far the pointer moved since the last call, to the right and
+                down, fractions of the element's width and height.
+
+        Returns:
+            The id to give to the element; its content may be replaced meanwhile.
+        """
+        self._dragged[name] = dragged
+        call_javascript(self._client, "window.photolinClicks.drag", name)
+        return f"photolin-{name}"
+
 
 def _ignore(x: float, y: float) -> None:
     """Clicks on an element that is only looked at."""
 
 
-def event_in_text(text: str) -> Click | Sight | None:
-    """What the page wrote as "number name x,y", "number name shown" or "... hidden", or None."""
-    number = r"([01]\.[0-9]{1,6})"
-    found = re.fullmatch(
-        rf"[0-9]{{1,9}} ([a-z-]{{1,40}}) (?:{number},{number}|(shown|hidden))", text, re.ASCII
-    )
+def event_in_text(text: str) -> Click | Drag | Sight | None:
+    """What the page wrote: a number, a name, and "x,y", "by right,down", "shown" or "hidden"."""
+    found = re.fullmatch(r"[0-9]{1,9} ([a-z-]{1,40}) (by )?(.{1,30})", text, re.ASCII)
     if found is None:
         return None
-    if found[4] is not None:
-        return Sight(found[1], found[4] == "shown")
-    x, y = float(found[2]), float(found[3])
-    return Click(found[1], x, y) if x <= 1 and y <= 1 else None
+    name, by, rest = found.groups()
+    if rest in ("shown", "hidden") and by is None:
+        return Sight(name, rest == "shown")
+    number = r"(-?[01]\.[0-9]{1,6})"
+    pair = re.fullmatch(f"{number},{number}", rest, re.ASCII)
+    if pair is None:
+        return None
+    x, y = float(pair[1]), float(pair[2])
+    if max(abs(x), abs(y)) > 1 or (by is None and "-" in rest):
+        return None
+    return Click(name, x, y) if by is None else Drag(name, x, y)
 
 
 @functools.cache

@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from photolin.factors import OUTSIDE, PALETTE, Factor
 
+from .difference import render_difference
 from .frame import Frame
+from .layers import hides_labels, render_layer
 from .render import alpha_of
-from .state import Layer
+from .state import TRUTH
 
 Picture = NDArray[np.uint8]
 
@@ -17,13 +19,49 @@ LINE = (255, 255, 255)
 """Colour of the dividing line, on black."""
 
 
-def other_frame(frame: Frame, layer: Layer) -> Frame:
-    """What is compared with: another layer, by the method beside where there is one."""
-    analysis, labels = frame.analysis, frame.labels
-    if frame.state.beside is not None and frame.beside is not None:
-        analysis, labels = frame.beside, frame.beside_labels
-    state = replace(frame.state, layer=layer)
-    return replace(frame, state=state, analysis=analysis, labels=labels, preview=None)
+def other_frame(frame: Frame) -> Frame | None:
+    """The frame of the right picture: another layer, by the method beside where there is one.
+
+    That of the truth has no analysis. None where nothing is compared, or a truth is not known.
+    """
+    state = frame.state
+    if state.against is None:
+        return None
+    if state.against == TRUTH:
+        if frame.truth is None:
+            return None
+        told = replace(state, layer="labels", against=None)
+        labels = frame.truth[state.image]
+        return replace(frame, state=told, analysis=None, labels=labels, preview=None)
+    shown = replace(state, layer=state.against, against=None)
+    if frame.beside is None:
+        return replace(frame, state=shown)
+    labels = frame.beside_labels
+    return replace(frame, state=shown, analysis=frame.beside, labels=labels, preview=None)
+
+
+def mixture(frame: Frame, other: Frame) -> tuple[object, ...]:
+    """What decides a picture of two frames, besides the first one's own picture."""
+    s = frame.state
+    divider = s.divider if s.arrangement == "split" else None
+    how = (s.against, s.arrangement, divider, s.shown, s.opacity, s.thresholds, s.light)
+    return (*how, frame.analysis, other.analysis, frame.preview, frame.shape)
+
+
+def lay_together(frame: Frame, other: Frame) -> tuple[NDArray[np.uint8], str]:
+    """Both in one picture (H,W,3), with their labels, and its legend."""
+    state = frame.state
+    if state.arrangement == "difference":
+        found = render_difference(frame, other)
+        if found is not None:
+            return found
+        one, two = (lay_over(render_layer(f)[0], f, hidden=True) for f in (frame, other))
+        return differ(one, two), "difference of both pictures, black is equal"
+    (one, first), (two, second) = render_layer(frame), render_layer(other)
+    one = lay_over(one, frame, hides_labels(frame))
+    two = lay_over(two, other, hides_labels(other))
+    divider = {"left": 1.0, "right": 0.0}.get(state.arrangement, state.divider)
+    return split(one, two, divider), f"left: {first}\nright: {second}"
 
 
 def lay_over(picture: Picture, frame: Frame, hidden: bool) -> Picture:

@@ -16,6 +16,8 @@ from .state import ViewState
 
 MOST_PIXELS = 300_000
 """Pixels that are linearized at once, about; more are thinned out."""
+MOST_OBSERVATIONS = 26 * MOST_PIXELS
+"""Pixels times images; stacks of many images are thinned out more."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class Live:
         if not is_behind(state, near):
             self._preview = None
             return None
-        part = choose_part(self._stack.shape[1:], window)
+        part = choose_part(self._stack.shape, window)
         last = self._preview
         now = (near, part, state.thresholds)
         if last is not None and (last.near, last.part, last.analysis.thresholds) == now:
@@ -131,10 +133,11 @@ def is_behind(state: ViewState, near: Analysis) -> bool:
     return state.live and near.options.method == "robust" and near.thresholds != state.thresholds
 
 
-def choose_part(shape: tuple[int, int], window: Window | None) -> Part:
-    """The part of a picture that is worth linearizing: all of a small one, else what is seen."""
-    H, W = shape
-    if window is None or H * W <= MOST_PIXELS:
+def choose_part(shape: tuple[int, int, int], window: Window | None) -> Part:
+    """The part of a stack (K,H,W) worth linearizing: all of a small one, else what is seen."""
+    K, H, W = shape
+    most = min(MOST_PIXELS, MOST_OBSERVATIONS // K)
+    if window is None or most >= H * W:
         window = Window(0, H, 0, W, 1.0)
     row0, row1, column0, column1, scale = window
     # one pixel for each of the screen, and no more than can be followed
@@ -142,8 +145,8 @@ def choose_part(shape: tuple[int, int], window: Window | None) -> Part:
     while True:
         # on one grid for all windows: a moved one keeps the pixels it looks at
         part = Part(row0 // step * step, row1, column0 // step * step, column1, step)
-        rows, columns = (range(*s.indices(max(shape))) for s in part.place)
-        if len(rows) * len(columns) <= MOST_PIXELS:
+        rows, columns = (range(*s.indices(max(H, W))) for s in part.place)
+        if len(rows) * len(columns) <= most:
             return part
         step += 1
 

@@ -2,30 +2,22 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from photolin.analysis import Analysis
+from photolin.factors import LETTERS, OUTSIDE, Factor
 
 from .canvas import Canvas
-from .compare import differ, lay_over, other_frame, split
+from .compare import lay_together, mixture, other_frame
 from .frame import Frame
+from .layers import SIGNED, hides_labels, render_layer
 from .readout import status_line
-from .render import (
-    choose_scale,
-    encode_jpeg,
-    encode_labels,
-    encode_png,
-    render_input,
-    render_linearized,
-    render_residual,
-)
-from .state import ENCODINGS, SURFACE, Layer, Pixel
-from .surface import render_surface
+from .render import encode_jpeg, encode_labels, encode_png
+from .second import Second
+from .state import ENCODINGS, SURFACE, TRUTH, Pixel, ViewState
 
-SIGNED = ("linearized", "residual")
-"""Layers of a result with colours of their own."""
 KEPT = 32
 """Encoded pictures kept for stepping back and forth."""
 Marks = Sequence[tuple[int, int, str]]
+Encoded = dict[tuple[object, ...], tuple[bytes, str]]
 LARGE = 400_000
 """Pixels above which a picture is first sent as JPEG, and without loss once nothing changes."""
 
@@ -33,8 +25,71 @@ HIDDEN = "; labels hidden here, outlines show them"
 """End of the caption of a picture without its labels."""
 
 
+class Sheet:
+    """A picture and its overlay, on the planes of either picture that a canvas has."""
+
+    def __init__(self, planes: Canvas | Second, encoded: Encoded) -> None:
+        """Draw on `planes`; pictures of input are kept in `encoded` for stepping back and forth."""
+        self._planes, self._encoded = planes, encoded
+        self._drawn: dict[str, object] = {}
+        self.legend = ""
+        """What the picture's greys or colours mean."""
+        self.rough = False
+        """Whether the picture on screen is a lossy one."""
+
+    def paint(self, frame: Frame, other: Frame | None = None, *, rested: bool) -> None:
+        """Show a frame.
+
+        Args:
+            other: is laid into the same picture, as the frame's state arranges both.
+        """
+        state = frame.state
+        result = frame.analysis if state.layer in SIGNED else None
+        shape = frame.shape if state.layer in SURFACE else None
+        light = state.light if state.layer == "relit" else None
+        look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
+        both = None if other is None else mixture(frame, other)
+        choice = ENCODINGS.index(state.encoding)
+        exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
+        if is_new(self._drawn, "picture", *look, both, choice) or (exact and self.rough):
+            encoded, self.legend = self._encode(frame, other, (*look, exact), exact)
+            self._planes.set_base(encoded, "png" if exact else "jpeg")
+            self.rough = not exact and choice == 0
+        self._paint_overlay(frame, hidden=other is not None or hides_labels(frame))
+
+    def _encode(
+        self, frame: Frame, other: Frame | None, key: tuple[object, ...], exact: bool
+    ) -> tuple[bytes, str]:
+        """Bytes and legend of a picture; an input is encoded once, as long as it is a late one."""
+        # others would keep results alive
+        kept = frame.state.layer not in (*SIGNED, *SURFACE) and other is None
+        found = self._encoded.pop(key, None) if kept else None
+        if found is None:
+            picture, legend = render_layer(frame) if other is None else lay_together(frame, other)
+            found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
+        if kept:
+            self._encoded[key] = found  # the latest are last
+        for oldest in list(self._encoded)[:-KEPT]:
+            del self._encoded[oldest]
+        return found
+
+    def _paint_overlay(self, frame: Frame, *, hidden: bool) -> None:
+        state = frame.state
+        solid = state.layer == "labels"
+        look = (state.shown, state.opacity, state.outlines, solid, hidden, frame.labels is None)
+        how = (state.image, state.thresholds, frame.analysis, frame.preview)
+        if not is_new(self._drawn, "overlay", *how, look):
+            return
+        overlay = None
+        if frame.labels is not None and not hidden:
+            overlay = encode_labels(
+                frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
+            )
+        self._planes.set_overlay(overlay)
+
+
 class Painter:
-    """Picture, overlay, marker and readout of one tab."""
+    """Pictures, overlays, markers and readout of one tab."""
 
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
@@ -43,11 +98,12 @@ class Painter:
             "orbit": (False,),
             "arrows": (None, 0),
             "light": (None,),
+            "arrangement": (None, 0.0),
         }
         """The key by which each part was drawn; at first, what an empty canvas shows."""
-        self._legend = ""
-        self._rough = False
-        self._encoded: dict[tuple[object, ...], tuple[bytes, str]] = {}
+        self._encoded: Encoded = {}
+        self._first = Sheet(canvas, self._encoded)
+        self._second = Sheet(canvas.second, self._encoded)
 
     def paint(
         self, frame: Frame, pointer: Pixel | None, marks: Marks = (), *, rested: bool
@@ -63,58 +119,42 @@ class Painter:
             Whether the picture on screen is still a lossy one.
         """
         state = frame.state
-        result = frame.analysis if state.layer in SIGNED else None
-        shape = frame.shape if state.layer in SURFACE else None
-        light = state.light if state.layer == "relit" else None
-        look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
-        compared = compared_with(frame)
-        choice = ENCODINGS.index(state.encoding)
-        exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
-        if self._is_new("picture", *look, compared, choice) or (exact and self._rough):
-            encoded, self._legend = self._encode(frame, (*look, compared, exact), exact)
-            self._canvas.set_base(encoded, "png" if exact else "jpeg")
-            self._rough = not exact and choice == 0
-        self._paint_overlay(frame)
+        other = other_frame(frame)
+        # the surface carries one picture only
+        joined = state.arrangement == "difference" or (state.relief and frame.shape is not None)
+        apart = None if joined else other
+        self._first.paint(frame, other if joined else None, rested=rested)
+        if apart is not None:
+            self._second.paint(apart, rested=rested)
+        self._arrange(None if apart is None else state)
         if self._is_new("marker", state.pixel):
             self._canvas.set_marker(state.pixel)
         if self._is_new("marks", marks):
             self._canvas.set_pins(marks)
         self._paint_surface(frame)
-        told = hides_labels(frame) and state.layer in SIGNED  # who sees a shape expects no labels
-        caption = self._legend + (HIDDEN if told else "")
-        self._canvas.set_readout(caption if pointer is None else describe(frame, pointer))
-        return self._rough
+        self._canvas.set_readout(
+            self._caption(frame, apart) if pointer is None else describe(frame, pointer, other)
+        )
+        return self._first.rough or (apart is not None and self._second.rough)
 
-    def _encode(self, frame: Frame, key: tuple[object, ...], exact: bool) -> tuple[bytes, str]:
-        """Bytes and legend of a picture; an input is encoded once, as long as it is a late one."""
-        found = self._encoded.pop(key, None)
-        if found is None:
-            picture, legend = render_layer(frame)
-            if frame.state.against is not None:
-                picture = lay_beside(frame, picture, frame.state.against)
-            found = (encode_png(picture) if exact else encode_jpeg(picture), legend)
-        # others would keep results alive
-        if frame.state.layer not in (*SIGNED, *SURFACE) and frame.state.against is None:
-            self._encoded[key] = found  # the latest are last
-        for oldest in list(self._encoded)[:-KEPT]:
-            del self._encoded[oldest]
-        return found
+    def _arrange(self, state: ViewState | None) -> None:
+        how = (None, 0.0) if state is None else (state.arrangement, state.divider)
+        if self._is_new("arrangement", *how):
+            self._canvas.second.arrange(*how)
 
-    def _paint_overlay(self, frame: Frame) -> None:
-        state = frame.state
-        solid = state.layer == "labels"
-        hidden = hides_labels(frame) or state.against is not None
-        look = (state.shown, state.opacity, state.outlines, solid, hidden)
-        if not self._is_new(
-            "overlay", state.image, state.thresholds, frame.analysis, frame.preview, look
-        ):
-            return
-        overlay = None
-        if frame.labels is not None and not hidden:
-            overlay = encode_labels(
-                frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
-            )
-        self._canvas.set_overlay(overlay)
+    def _caption(self, frame: Frame, apart: Frame | None) -> str:
+        """What the greys or colours of the pictures mean."""
+        hidden = hides_labels(frame) and frame.state.layer in SIGNED
+        # who sees a shape expects no labels, nor does who sees a difference
+        told = hidden and (apart is not None or other_frame(frame) is None)
+        first = self._first.legend + (HIDDEN if told else "")
+        if apart is None:
+            return first
+        by = frame.state.method if apart.analysis is None else apart.analysis.options.method
+        right = TRUTH if frame.state.against == TRUTH else f"{by}, {self._second.legend}"
+        names = {"left": f"left: {frame.state.method}, {first}", "right": f"right: {right}"}
+        alone = names.get(frame.state.arrangement)
+        return "\n".join(names.values()) if alone is None else alone
 
     def _paint_surface(self, frame: Frame) -> None:
         """The surface, whether the picture lies on it, and the lights around it."""
@@ -132,66 +172,43 @@ class Painter:
             self._canvas.set_light(light)
 
     def _is_new(self, part: str, *key: object) -> bool:
-        if self._drawn.get(part) == key:
-            return False
-        self._drawn[part] = key
-        return True
+        return is_new(self._drawn, part, *key)
 
 
-def compared_with(frame: Frame) -> tuple[object, ...] | None:
-    """What decides the second picture and the labels of both; None without one."""
-    s = frame.state
-    if s.against is None:
-        return None
-    how = (s.against, s.divider, s.difference, s.shown, s.opacity, s.thresholds, s.light)
-    return (*how, frame.analysis, frame.beside, frame.preview, frame.shape)
+def is_new(drawn: dict[str, object], part: str, *key: object) -> bool:
+    """Whether a part is to be drawn by another key than before, which is noted."""
+    if drawn.get(part) == key:
+        return False
+    drawn[part] = key
+    return True
 
 
-def lay_beside(frame: Frame, picture: NDArray[np.uint8], layer: Layer) -> NDArray[np.uint8]:
-    """The picture shown with another one beside it, each with its labels, (H,W,3)."""
-    other = other_frame(frame, layer)
-    one = lay_over(picture, frame, hides_labels(frame))
-    two = lay_over(render_layer(other)[0], other, hides_labels(other))
-    state = frame.state
-    return differ(one, two) if state.difference else split(one, two, state.divider)
+def describe(frame: Frame, pixel: Pixel, other: Frame | None = None) -> str:
+    """The values of a pixel (row, column) in the image shown, in one line; of `other` in another.
 
-
-def hides_labels(frame: Frame) -> bool:
-    """Whether labels are left out because they would hide the signed picture's own colours.
-
-    Outlines leave enough of it to be seen.
+    The picture is told first, and what it is compared with next.
     """
-    state = frame.state
-    coloured = state.layer in SIGNED or (state.layer in SURFACE and frame.shape is not None)
-    return coloured and frame.labels is not None and not state.outlines
-
-
-def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
-    """The picture under the overlay, (H,W) or (H,W,3), and what its greys or colours mean."""
-    state, stack = frame.state, frame.stack
-    if state.layer in SURFACE and frame.shape is not None:
-        return render_surface(frame.shape, state.layer, state.light, stack.mask)
-    if frame.analysis is None or state.layer not in SIGNED:
-        gain = state.gain or 1.0
-        shown = "" if gain == 1 else f", shown {gain:g} times brighter"
-        return render_input(stack.images[state.image], gain), f"{state.layer}{shown}"
-    signed = frame.analysis.linearized(state.image)
-    if state.layer == "linearized":
-        scale = choose_scale(signed, stack.mask)
-        text = f"linearized, black -{scale:.3f} to white +{scale:.3f} of full scale, zero mid-grey"
-        return render_linearized(signed, scale), text
-    residual = np.where(stack.mask, stack.images[state.image] - signed, np.float32(0))
-    scale = choose_scale(residual, stack.mask)
-    text = f"residual, blue -{scale:.3f} to red +{scale:.3f} of full scale, zero white"
-    return render_residual(residual, scale), text
-
-
-def describe(frame: Frame, pixel: Pixel) -> str:
-    """The values of a pixel (row, column) in the image shown, in one line."""
     row, column = pixel
-    k = frame.state.image
-    i = float(frame.stack.images[k, row, column])
+    i = float(frame.stack.images[frame.state.image, row, column])
     if frame.analysis is None or frame.labels is None:
-        return f"row {row}  column {column}  i {i:.3f}"
-    l = float(frame.analysis.coefficients[k] @ frame.analysis.linearized_bases[:, row, column])
-    return status_line(row, column, i, l, int(frame.labels[row, column]))
+        first = f"row {row}  column {column}  i {i:.3f}"
+    else:
+        l = _linearized_at(frame.analysis, frame.state.image, pixel)
+        first = status_line(row, column, i, l, int(frame.labels[row, column]))
+    if other is None:
+        return first
+    letter = ""
+    if other.labels is not None and (label := int(other.labels[row, column])) != OUTSIDE:
+        letter = LETTERS[Factor(label)]
+    if frame.state.against == TRUTH:
+        return f"left:  {first}\nright: truth {letter}"
+    if other.analysis is None:
+        return first
+    l = _linearized_at(other.analysis, other.state.image, pixel)
+    values = f"i {i:.3f}  l {l:z.3f}  residual {i - l:+z.3f}  {letter}"
+    return f"left:  {first}\nright: row {row}  column {column}  {values}"
+
+
+def _linearized_at(analysis: Analysis, k: int, pixel: Pixel) -> float:
+    row, column = pixel
+    return float(analysis.coefficients[k] @ analysis.linearized_bases[:, row, column])

@@ -14,6 +14,7 @@ from .clicks import Clicks
 from .frame import Frame
 from .saved import Saved
 from .state import Pixel, ViewState
+from .views.cloud import CloudView
 from .views.compare import CompareView
 from .views.diagnosis import DiagnosisView
 from .views.export import ExportView
@@ -47,8 +48,6 @@ class Actions:
     """Send files of a kind, of all images or of the one shown."""
     recover: Callable[[], None]
     """Recover the shape."""
-    resample: Callable[[], None]
-    """Draw the samples again."""
     pin: Callable[[], None]
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
@@ -80,7 +79,8 @@ class Panels:
             known: whether frames come with the truth.
             state: whose method and thresholds are set at first.
         """
-        gui, changed, clicks = client.gui, actions.changed, Clicks(client)
+        gui, changed = client.gui, actions.changed
+        self.clicks = clicks = Clicks(client)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune", viser.Icon.ADJUSTMENTS):
             self.picture = PictureView(gui, stack, changed, canvas.fit, canvas.one_to_one)
@@ -96,15 +96,21 @@ class Panels:
                 summary = SummaryView(gui)
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self.thresholds.add_steps(gui)
-            self.samples = SamplesView(gui, clicks, stack, actions.resample, self.thresholds.set_Ts)
+            setters = (self.thresholds.set_T, self.thresholds.set_Ts)
+            self.samples = SamplesView(gui, clicks, canvas, changed, *setters)
+            canvas.on_box(self.samples.take_box)
         with tabs.add_tab("Map", viser.Icon.MAP):
             self.landscape = LandscapeView(
                 gui, clicks, self.thresholds.set, actions.tell, known=known
             )
         with tabs.add_tab("Pixel", viser.Icon.TARGET):
             self.diagnosis = DiagnosisView(gui, clicks, actions.pin, actions.unpin, self.picture.go)
+        with tabs.add_tab("Lights", viser.Icon.BULB):
+            self.cloud = CloudView(gui, clicks, actions.tell)
         with tabs.add_tab("Compare", viser.Icon.LAYOUT_COLUMNS):
-            self.compare = CompareView(gui, changed)
+            add_choice = self.pixel.add_choice
+            self.compare = CompareView(gui, clicks, changed, add_choice, known=known)
+            canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self.shape = ShapeView(gui, stack, changed, actions.recover)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
@@ -117,13 +123,14 @@ class Panels:
         self._readers = (self.run, *both, self.legend, self.compare, self.shape)
         self._drawers = (
             *(*both, self.samples, self.landscape, shares, summary),
-            *(self.diagnosis, self.compare, self.shape),
+            *(self.diagnosis, self.cloud, self.compare, self.shape),
         )
         self._keys = self._bind(actions)
 
     def close(self) -> None:
         """Stop what panels compute."""
         self.landscape.close()
+        self.cloud.close()
 
     def read(self, state: ViewState) -> ViewState:
         """The state with all that widgets stand for."""
@@ -142,13 +149,17 @@ class Panels:
         for view in self._drawers:
             view.draw(frame)
 
+    def redraw(self) -> None:
+        """Show what changed in panels without a change of the state."""
+        self.samples.redraw()
+
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""
-        return self.shape.take(pixel) or self.samples.take(pixel)
+        return self.samples.take(pixel) or self.shape.take(pixel)
 
     def marks(self) -> tuple[tuple[int, int, str], ...]:
         """(row, column, text) of what was clicked for panels."""
-        return (*self.shape.marks, *self.samples.marks)
+        return self.shape.marks
 
     def press(self, key: str) -> None:
         """Do what a key stands for, if anything."""
@@ -178,10 +189,11 @@ class Panels:
             "e": lambda: actions.download(*self.export.chosen()),
             "p": actions.pin,
             "b": self.compare.flicker,
+            "B": self.compare.show_both,
             "x": partial(self.diagnosis.next, Factor.SPECULAR),
             "u": partial(self.diagnosis.next, Factor.UNDEFINED),
             "c": actions.copy,
             "n": actions.recover,
             "d": self.shape.toggle,
-            "escape": actions.stop,
+            "escape": lambda: (actions.stop(), self.samples.stop()),
         }

@@ -100,7 +100,7 @@ def describe_pixel(
     if not inside:
         return f"{where} lies outside the mask: nothing was computed there."
     lit = int(np.count_nonzero(np.asarray(i, np.float32) >= np.float32(thresholds.Ts)))
-    level = _threshold(thresholds.Ts)
+    level = tell_threshold(thresholds.Ts)
     sentence = f"{where} is lit (i ≥ Ts = {level}) in {lit} of {len(i)} images"
     if lit < 3:
         return f"{sentence}: its linearized value cannot be determined."
@@ -131,7 +131,7 @@ def legend(labels: NDArray[np.uint8]) -> tuple[LegendRow, ...]:
 
 def preview_status(thresholds: Thresholds, step: int, whole: bool, seconds: float) -> str:
     """That a linearization has followed the thresholds, how much of it, and how long it took."""
-    T, Ts = _threshold(thresholds.T), _threshold(thresholds.Ts)
+    T, Ts = tell_threshold(thresholds.T), tell_threshold(thresholds.Ts)
     nth = {1: "st", 2: "nd", 3: "rd"}.get(step % 10 if step % 100 not in (11, 12, 13) else 0, "th")
     each = "the part on screen" if step == 1 else f"every {step}{nth} pixel"
     part = "" if whole else f" of {each}"
@@ -200,8 +200,8 @@ def summarize(analysis: Analysis) -> str:
     count = int(np.count_nonzero(analysis.mask))
     return (
         f"{analysis.options.method}: {K} images of {H} rows × {W} columns, {count} pixels in the "
-        f"mask, base images {bases}, T {_threshold(analysis.thresholds.T)}, "
-        f"Ts {_threshold(analysis.thresholds.Ts)}, {analysis.seconds['total']:.2f} s."
+        f"mask, base images {bases}, T {tell_threshold(analysis.thresholds.T)}, "
+        f"Ts {tell_threshold(analysis.thresholds.Ts)}, {analysis.seconds['total']:.2f} s."
     )
 
 
@@ -210,7 +210,7 @@ def _number(value: float) -> str:
     return f"{value:.1e}" if 0 < abs(value) < 0.0005 else f"{value:z.3f}"
 
 
-def _threshold(value: float) -> str:
+def tell_threshold(value: float) -> str:
     """Four decimals, the sliders' step being 0.0005; scientific where that would read as zero."""
     return f"{value:.1e}" if 0 < value < 0.00005 else f"{value:.4f}"
 

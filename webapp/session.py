@@ -27,7 +27,6 @@ from .panels import Actions, Panels
 from .pointing import Pointing
 from .saved import Saved
 from .selections import Selections
-from .start import start_from
 from .state import SURFACE, Pixel, ViewState
 from .work import Desk
 
@@ -40,23 +39,34 @@ PATIENCE = 0.25
 class Session:
     """The widgets, the state and the worker of one tab."""
 
-    def __init__(self, client: viser.ClientHandle, selections: Selections, keeper: Keeper) -> None:
-        """Build the tab, as it was kept, and start to work for it."""
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        selections: Selections,
+        keeper: Keeper,
+        start: Saved,
+        *,
+        again: bool,
+    ) -> None:
+        """Build the tab and start to work for it.
+
+        Args:
+            start: what it shows at first.
+            again: whether somebody has chosen that, so that no thresholds are suggested.
+        """
         self._client, self._source, self._keeper = client, selections.source, keeper
         self._wake, self._closed = Event(), Event()
         self.notices = Notices(client, self._closed)
         self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
-        kept = keeper.latest
-        start = start_from(self._source, kept)
         self._excluded = start.exclusions
         self._saved: Saved | None = None
-        first = start.state.thresholds if kept is None else None
+        first = None if again else start.state.thresholds
         self._bench = Bench(selections, self._excluded, first, self._desk())
         self._changed = monotonic()
         self._pointing = Pointing(self._wake.set)
         self._build(start.state)
-        if kept is not None:
+        if again:
             self._pointing.restore(start.state)
             self._panels.restore(start)
         self._wake.set()
@@ -139,7 +149,6 @@ class Session:
             recover=self._recover,
             exclude=self._exclude,
             copy=self._copy,
-            resample=self._resample,
             pin=self._pointing.pin,
             unpin=self._pointing.unpin,
             tell=self.notices.tell,
@@ -181,11 +190,6 @@ class Session:
         else:
             self._canvas.copy(command)
             self.notices.say("Copied", command)
-
-    def _resample(self) -> None:
-        if self._frame is not None:
-            self._panels.samples.draw(self._frame)
-        self._wake.set()
 
     # --- drawing ---
 
@@ -233,6 +237,7 @@ class Session:
             self._panels.draw(frame)
         else:
             rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
+            self._panels.redraw()
         behind = bench.catch_up.pursue(state, results.get(state.method), rested)
         return self._keep(state, rested) or behind or rough or moving
 

@@ -11,6 +11,12 @@ Layer = Literal["input", "linearized", "residual", "labels", "albedo", "normals"
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 """Layers that are there once a shape is."""
+Against = Layer | Literal["truth"]
+TRUTH = "truth"
+"""The label map of the truth, where it is known."""
+AGAINST: tuple[Against, ...] = (*LAYERS, TRUTH)
+Arrangement = Literal["split", "side by side", "difference", "left", "right"]
+ARRANGEMENTS: tuple[Arrangement, ...] = get_args(Arrangement)
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
 
@@ -30,7 +36,7 @@ class ViewState:
     method: Method = "robust"
     """Whose result is shown."""
     beside: Method | None = None
-    """Whose result is plotted beside it for the selected pixel (Fig. 9)."""
+    """Whose result it is compared with: for the selected pixel (Fig. 9), and in the picture."""
     T: float = 0.05
     """Relative tolerance of i = l, unitless, in (0, 1]."""
     Ts: float = 0.02
@@ -43,12 +49,13 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
-    against: Layer | None = None
-    """The layer, by the method beside where one is, that the picture is compared with."""
+    against: Against | None = None
+    """The layer, by the method beside where one is, or the truth, that is the right picture."""
+    arrangement: Arrangement = "split"
+    """How the left picture, of `layer` and `method`, and the right one are shown; the last two
+    show one of them alone."""
     divider: float = 0.5
-    """Share of the width at which the compared picture begins, 0 to 1."""
-    difference: bool = False
-    """Show the difference of both in place of their parts."""
+    """Share of the width at which the right picture begins when split, 0 to 1."""
     relief: bool = False
     """Lay the picture on the surface, and turn around it."""
     arrows: bool = True
@@ -81,8 +88,11 @@ class ViewState:
                 f"light is {self.light}; accepted are x and y of a direction towards the camera's "
                 "side, of length below 1"
             )
-        if self.against is not None and self.against not in LAYERS:
-            raise OptionError(f"against is {self.against!r}; accepted are {', '.join(LAYERS)}")
+        if self.against is not None and self.against not in AGAINST:
+            raise OptionError(f"against is {self.against!r}; accepted are {', '.join(AGAINST)}")
+        if self.arrangement not in ARRANGEMENTS:
+            accepted = ", ".join(ARRANGEMENTS)
+            raise OptionError(f"arrangement is {self.arrangement!r}; accepted are {accepted}")
         if not 0 <= self.divider <= 1:
             raise OptionError(f"divider is {self.divider:g}; accepted is 0 to 1")
         if len(self.pins) > MOST_PINS or len(set(self.pins)) < len(self.pins):

@@ -21,6 +21,8 @@ from .downloads import (
     make_shape_download,
     relabel,
 )
+from .figure import KINDS as FIGURE_KINDS
+from .figure import make_figure
 from .frame import Recovered
 from .job import Job
 from .live import is_behind
@@ -117,11 +119,12 @@ class Work:
         if kind == SHAPE:
             self._begin(self._send_shape)
         else:
-            chosen = (
-                partial(self._report, notes)
-                if kind == REPORT
-                else partial(self._pack, kind, everything)
-            )
+            chosen = partial(self._pack, kind, everything)
+            if kind == REPORT:
+                chosen = partial(self._report, notes)
+            elif kind in FIGURE_KINDS:
+                job = self._job
+                chosen = partial(make_figure, self._runs, kind, self._desk.progress, job.stopping)
             self._begin(partial(self._send, self._desk.read(), chosen))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
@@ -148,6 +151,8 @@ class Work:
             self._desk.refuse()
 
     def _guarded(self, work: Callable[[], None]) -> None:
+        if self._job.closed:
+            return
         self._desk.busy(True)
         try:
             work()

@@ -19,7 +19,7 @@ from .cache import choose_cache
 
 choose_cache(Path(__file__).parent)
 
-from .consensus import consensus_rows  # noqa: E402
+from .consensus import consensus_rows, score_candidates  # noqa: E402
 from .diffuse import diffuse_rows  # noqa: E402
 from .evidence import evidence_rows  # noqa: E402
 from .fine import fine_band  # noqa: E402
@@ -27,10 +27,11 @@ from .grazing import grazing_rows  # noqa: E402
 from .labels import label_rows  # noqa: E402
 from .neighbours import settle_rows  # noqa: E402
 from .pooled import clear_tile, pooled_tile  # noqa: E402
-from .samples import centre_rows, support_rows  # noqa: E402
+from .samples import centre_path, centre_rows, support_rows  # noqa: E402
 from .trust import trust_rows  # noqa: E402
 
 __all__ = [
+    "centre_path",
     "centre_rows",
     "clear_tile",
     "consensus_rows",
@@ -40,6 +41,7 @@ __all__ = [
     "grazing_rows",
     "label_rows",
     "pooled_tile",
+    "score_candidates",
     "settle_rows",
     "support_rows",
     "trust_rows",

@@ -273,3 +273,18 @@ def consensus_rows(
             out[r] = np.nan
         elif reach > 0:
             _polish(x, a0, a1, a2, n, reach, w, out[r])
+
+
+@njit(nogil=True, cache=True)
+def score_candidates(x, A, v, T, diffuse, score, start, stop):  # pragma: no cover
+    """D and D - U over lit observations of one row, for each of its candidates start..stop.
+
+    Args:
+        x: (M,) float32 lit observations.
+        A: (3,M) float32 factors.
+        v: (n,3) float32 candidates.
+        T: float32 threshold.
+        diffuse, score: (n,) int32, written: D, and D minus U.
+    """
+    for s in range(start, stop):
+        score[s], diffuse[s] = _score(x, A[0], A[1], A[2], len(x), v[s], T)

@@ -42,6 +42,58 @@ def support_rows(X, A, triples, inverses, T, Ts, out, support, start, stop):  # 
 
 
 @njit(nogil=True, cache=True)
+def _drop(v, distance, left, keep, centre):  # pragma: no cover
+    """Write the centre of v[:left], move those not beyond the mean distance from it to the front.
+
+    Returns how many those are; `left` where the centre is the last one.
+    """
+    m0 = m1 = m2 = 0.0
+    for s in range(left):
+        m0 += v[s, 0]
+        m1 += v[s, 1]
+        m2 += v[s, 2]
+    m0, m1, m2 = m0 / left, m1 / left, m2 / left
+    centre[0], centre[1], centre[2] = m0, m1, m2
+    mean = 0.0
+    for s in range(left):
+        distance[s] = np.sqrt((v[s, 0] - m0) ** 2 + (v[s, 1] - m1) ** 2 + (v[s, 2] - m2) ** 2)
+        mean += distance[s] / left
+    if mean <= 1e-6 * (abs(m0) + abs(m1) + abs(m2)):
+        return left
+    kept = 0
+    for s in range(left):
+        if distance[s] <= mean:
+            v[kept] = v[s]
+            kept += 1
+    return left if kept < keep else kept
+
+
+@njit(nogil=True, cache=True)
+def centre_path(v, keep, path, counts):  # pragma: no cover
+    """All centres of gravity that `centre_rows` goes through with the candidates v.
+
+    Args:
+        v: (n,3) float64 candidates; their order and all but those left at the end is lost.
+        keep: how many candidates may be left at the least.
+        path: (n,3) float64, written: the centres.
+        counts: (n,) int64, written: of how many candidates each is the centre.
+
+    Returns:
+        How many centres there are, at least 1.
+    """
+    left = len(v)
+    distance = np.empty(left, np.float64)
+    steps = 0
+    while True:
+        kept = _drop(v, distance, left, keep, path[steps])
+        counts[steps] = left
+        steps += 1
+        if kept == left:
+            return steps
+        left = kept
+
+
+@njit(nogil=True, cache=True)
 def centre_rows(X, triples, inverses, keep, out, start, stop):  # pragma: no cover
     """Centre of gravity and outlier elimination among shared samples, for rows start..stop.
 
@@ -57,7 +109,7 @@ def centre_rows(X, triples, inverses, keep, out, start, stop):  # pragma: no cov
     """
     n = len(triples)
     v = np.empty((n, 3), np.float64)
-    distance = np.empty(n, np.float64)
+    distance, centre = np.empty(n, np.float64), np.empty(3, np.float64)
     for row in range(start, stop):
         x = X[row]
         for s in range(n):
@@ -68,26 +120,8 @@ def centre_rows(X, triples, inverses, keep, out, start, stop):  # pragma: no cov
             v[s, 2] = g[2, 0] * x0 + g[2, 1] * x1 + g[2, 2] * x2
         left = n
         while True:
-            m0 = m1 = m2 = 0.0
-            for s in range(left):
-                m0 += v[s, 0]
-                m1 += v[s, 1]
-                m2 += v[s, 2]
-            m0, m1, m2 = m0 / left, m1 / left, m2 / left
-            mean = 0.0
-            for s in range(left):
-                distance[s] = np.sqrt(
-                    (v[s, 0] - m0) ** 2 + (v[s, 1] - m1) ** 2 + (v[s, 2] - m2) ** 2
-                )
-                mean += distance[s] / left
-            if mean <= 1e-6 * (abs(m0) + abs(m1) + abs(m2)):
-                break
-            kept = 0
-            for s in range(left):
-                if distance[s] <= mean:
-                    v[kept] = v[s]
-                    kept += 1
-            if kept == left or kept < keep:
+            kept = _drop(v, distance, left, keep, centre)
+            if kept == left:
                 break
             left = kept
-        out[row, 0], out[row, 1], out[row, 2] = m0, m1, m2
+        out[row] = centre

@@ -38,6 +38,7 @@ from webapp.canvas import Window
 from webapp.frame import compose
 from webapp.live import Live
 from webapp.render import encode_labels
+from webapp.runs import Runs
 from webapp.state import ViewState
 
 SAMPLES = 500
@@ -220,12 +221,12 @@ def follow_slider(
     benchmark: BenchmarkFixture, stack: ImageStack, window: Window, near: Analysis
 ) -> float:
     """Median and 95th percentile in ms, from a value of T to the bytes of the overlay."""
-    live, steps = Live(stack), count()
+    live, runs, steps = Live(stack), Runs(stack, Options()), count()
 
     def move() -> bytes:
         T = 0.01 * 1.1 ** (next(steps) % 24)
         state = ViewState(T=round(T, 4), Ts=near.thresholds.Ts)
-        frame = compose(stack, {"robust": near}, state, live.follow(state, near, window, idle))
+        frame = compose(runs, {"robust": near}, state, live.follow(state, near, window, idle))
         assert frame.labels is not None
         assert frame.preview is not None
         return encode_labels(frame.labels)

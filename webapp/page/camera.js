@@ -4,7 +4,7 @@
 // turns around it instead.
 
 function openCamera({ viewer, rows, columns, planes, worldHeight }) {
-  const ROTATE = 1, TRUCK = 2, TOUCH_ROTATE = 64, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
+  const NONE = 0, ROTATE = 1, TRUCK = 2, TOUCH_ROTATE = 64, TOUCH_TRUCK = 128, TOUCH_DOLLY_TRUCK = 4096; // camera-controls ACTION
   const MARGIN = 0.98, CLOSEST = 128; // CLOSEST: CSS pixels per image pixel
   const FLAT = { near: 1e-4, far: 1e4 };
   const SOLID = { near: 0.1, far: 1e3 }; // these decide how finely depths are told apart
@@ -14,14 +14,23 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
 
   let size = null; // [width, height] of the canvas that the camera was placed for
   let fitted = null; // pose that fit() chose, to stay fitted when the window changes
+  let halves = 1; // views beside each other, of the same part of the picture
+  let panning = true; // a drag moves the picture, in 2D
   let orbiting = false; // the picture lies on the relief, and the camera turns around it
 
   const hasPicture = () => Boolean(viewer.nodeRefFromName[planes[0]] && viewer.cameraControl);
   const placed = () => size !== null && hasPicture();
   const focalLength = () => canvas.clientHeight / 2 / Math.tan((camera.fov * Math.PI) / 360);
   const distanceAt = (scale) => (focalLength() * worldPixel) / scale;
-  const fitScale = (width = canvas.clientWidth, height = canvas.clientHeight) =>
+  const fitScale = (width = canvas.clientWidth / halves, height = canvas.clientHeight) =>
     MARGIN * Math.min(width / columns, height / rows);
+
+  /** Width of the left one of two views, CSS pixels; 0 where there is one. */
+  const half = () =>
+    halves === 1 ? 0 : Math.round((canvas.clientWidth / 2) * devicePixelRatio) / devicePixelRatio;
+  /** How far right of the middle of the view the camera looks, in the world. */
+  const aside = (distance) =>
+    halves === 1 ? 0 : ((canvas.clientWidth - half()) / 2) * (distance / focalLength());
 
   /** Axes of the picture in three.js coordinates: right, down, into the picture, and its centre. */
   function axes() {
@@ -63,30 +72,61 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
   }
 
   function fit() {
-    place(axes()[3], distanceAt(fitScale()));
+    const [right, , , centre] = axes();
+    const distance = distanceAt(fitScale());
+    place(centre.addScaledVector(right, aside(distance)), distance);
     fitted = pose();
+  }
+
+  function isFitted() {
+    const { target, distance } = pose();
+    return (
+      fitted && Math.abs(distance / fitted.distance - 1) < 1e-6 &&
+      target.distanceTo(fitted.target) < 1e-6 * distance
+    );
+  }
+
+  /** Show one view or two beside each other, of what is shown now. */
+  function setHalves(count) {
+    if (count === halves) return;
+    if (!placed()) return void (halves = count);
+    const whole = isFitted();
+    const { target, distance } = pose();
+    const before = aside(distance);
+    halves = count;
+    if (whole) fit();
+    else place(target.addScaledVector(axes()[0], aside(distance) - before), distance);
   }
 
   /** One image pixel on one pixel of the device, around the present centre, edges on edges. */
   function oneToOne() {
     const [right, down, , centre] = axes();
-    const offset = pose().target.sub(centre).divideScalar(worldPixel);
+    const { target: now, distance } = pose();
+    const offset = now.addScaledVector(right, -aside(distance)).sub(centre).divideScalar(worldPixel);
+    const close = distanceAt(1 / window.devicePixelRatio);
     const snap = (along, pixels, deviceSize) =>
       Math.round(along - (pixels - deviceSize) / 2) + (pixels - deviceSize) / 2;
-    const x = snap(offset.dot(right), columns, canvas.width);
+    const x = snap(offset.dot(right) + aside(close) / worldPixel, columns, canvas.width);
     const y = snap(offset.dot(down), rows, canvas.height);
     const target = centre.addScaledVector(right, x * worldPixel).addScaledVector(down, y * worldPixel);
-    place(target, distanceAt(1 / window.devicePixelRatio));
+    place(target, close);
   }
 
   /** What the mouse and fingers do: move the picture, or turn it and move it. */
   function setActions() {
     const controls = viewer.cameraControl;
-    controls.mouseButtons.left = orbiting ? ROTATE : TRUCK;
-    controls.mouseButtons.right = TRUCK;
-    controls.touches.one = orbiting ? TOUCH_ROTATE : TOUCH_TRUCK;
+    controls.mouseButtons.left = orbiting ? ROTATE : panning ? TRUCK : NONE;
+    controls.mouseButtons.right = controls.mouseButtons.middle = TRUCK;
+    controls.touches.one = orbiting ? TOUCH_ROTATE : panning ? TOUCH_TRUCK : NONE;
     controls.touches.two = controls.touches.three = TOUCH_DOLLY_TRUCK;
     controls.dollyToCursor = !orbiting;
+  }
+
+  /** Whether drags with the left button, or one finger, move the picture while it is flat. */
+  function setPanning(on) {
+    if (on === panning) return;
+    panning = on;
+    if (placed()) setActions();
   }
 
   /** Turn around the picture, or face it squarely again; either begins with all of it in view. */
@@ -118,10 +158,7 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
       viewer.requestRender();
       return;
     }
-    const stillFitted =
-      fitted && Math.abs(distance / fitted.distance - 1) < 1e-6 &&
-      target.distanceTo(fitted.target) < 1e-6 * distance;
-    if (stillFitted) fit();
+    if (isFitted()) fit();
     else place(target, (distance * height) / size[1]); // the same scale as before
   }
 
@@ -166,7 +203,8 @@ function openCamera({ viewer, rows, columns, planes, worldHeight }) {
   }
 
   return {
-    hasPicture, placed, fit, oneToOne, setOrbit, follow, fitScale, similarity, project, eye, direction,
+    hasPicture, placed, fit, oneToOne, setPanning, setOrbit, follow, fitScale, similarity, project, eye, direction,
+    setHalves, half,
     isOrbiting: () => orbiting,
   };
 }

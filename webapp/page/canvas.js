@@ -6,8 +6,9 @@ window.openCanvas = (options) => {
 
   const NEAREST = 1003; // three.js NearestFilter
   const POST_MS = 50, VIEW_MS = 150;
+  const CLICK_PIXELS = 3; // a pointer that moves farther drags
 
-  const { rows, columns, planes, viewId } = options;
+  const { rows, columns, planes, others, viewId } = options;
   const viewer = window.__viserMutable;
   const { canvas, scene } = viewer;
   const closing = new AbortController();
@@ -42,22 +43,25 @@ window.openCanvas = (options) => {
     viewer.requestRender();
   }
 
-  const page = { ...options, viewer, layer, listen, send, sender, peek };
+  const page = { ...options, viewer, layer, listen, send, sender, peek, CLICK_PIXELS };
   const camera = openCamera(page);
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
-  openInput({ ...page, camera });
+  const compare = openCompare({ ...page, camera });
+  const band = openBand({ ...page, camera });
+  openInput({ ...page, camera, band });
 
   // --- before each frame ---
 
   function beforeRender() {
     if (!camera.hasPicture()) return;
     camera.follow();
-    const isShown = (order) => !(peeking && order > 0);
+    const isShown = (order) => !(peeking && order % 2 > 0); // pictures and overlays in turn
+    const spans = compare.spans();
     const isVisible = (order) => viewer.nodeRefFromName[planes[order]]?.visible ?? true;
     const lies = relief.draw((order) => camera.isOrbiting() && isShown(order) && isVisible(order));
-    planes.forEach((name, order) =>
+    [...planes, ...others].forEach((name, order) =>
       viewer.nodeRefFromName[name]?.traverse((mesh) => {
         if (!mesh.isMesh || !("map" in mesh.material)) return;
         const { material } = mesh;
@@ -68,8 +72,11 @@ window.openCanvas = (options) => {
           material.map.magFilter = NEAREST;
           material.map.needsUpdate = true;
         }
+        compare.cut(mesh, spans[order < planes.length ? 0 : 1]);
       }),
     );
+    compare.draw();
+    band.draw();
     marks.draw();
     tellView();
   }
@@ -86,7 +93,7 @@ window.openCanvas = (options) => {
       Math.max(0, Math.min(count, Math.floor(-start / scale))),
       Math.max(0, Math.min(count, solid ? count : Math.ceil((length - start) / scale))),
     ];
-    const [r, c] = [part(top, canvas.clientHeight, rows), part(left, canvas.clientWidth, columns)];
+    const [r, c] = [part(top, canvas.clientHeight, rows), part(left, camera.half() || canvas.clientWidth, columns)];
     const view = [...r, ...c, (scale * window.devicePixelRatio).toFixed(3)].join(",");
     if (view === viewed) return;
     viewed = view;
@@ -129,6 +136,7 @@ window.openCanvas = (options) => {
 
   function close() {
     closing.abort();
+    band.setSampling(null);
     clearTimeout(viewTimer);
     layer.remove();
     style.remove();
@@ -142,7 +150,10 @@ window.openCanvas = (options) => {
     setOrbit: camera.setOrbit,
     setMarks: marks.setMarks,
     setLight: light.setLight,
+    setComparison: compare.set,
     setReadout: marks.setReadout,
+    setSampling: band.setSampling,
+    setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),
     close,
   };

@@ -1,7 +1,6 @@
 // Pointer and keys: which pixel is meant, and who gets a key, the picture or a widget.
 
-function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, keyId, send, sender, peek }) {
-  const CLICK_PIXELS = 3; // a pointer that moves farther drags
+function openInput({ viewer, listen, rows, columns, camera, band, hoverId, pickId, keyId, send, sender, peek, CLICK_PIXELS }) {
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
   const { canvas } = viewer;
@@ -24,8 +23,9 @@ function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, key
       return `ray ${numbers.map((n) => n.toFixed(6)).join(",")}`;
     }
     const { scale, left, top } = camera.similarity();
+    const beyond = camera.half() > 0 && x >= camera.half(); // in the right one of two views
     const row = Math.floor((y - top) / scale);
-    const column = Math.floor((x - left) / scale);
+    const column = Math.floor((x - (beyond ? camera.half() : 0) - left) / scale);
     const inside = row >= 0 && row < rows && column >= 0 && column < columns;
     return inside ? `${row},${column}` : "";
   }
@@ -83,7 +83,7 @@ function openInput({ viewer, listen, rows, columns, camera, hoverId, pickId, key
     pressed = event.isPrimary && event.button === 0 ? event : null;
   });
   listen(canvas, "pointerup", release);
-  listen(canvas, "dblclick", () => camera.placed() && camera.fit());
+  listen(canvas, "dblclick", () => camera.placed() && !band.isSampling() && camera.fit());
   // After the widget has had the click; those made with the keyboard have no detail.
   listen(window, "click", ({ detail }) => detail > 0 && setTimeout(giveFocusBack), true);
   listen(window, "keydown", onKey, true);

@@ -14,7 +14,10 @@ function openMarks({ viewer, layer, rows, columns, camera, relief }) {
     "position:absolute;width:7px;height:7px;margin:-3.5px;border-radius:50%;background:#fff;" +
     "box-shadow:0 0 0 1px #000";
 
-  const grid = layer.appendChild(document.createElement("div"));
+  // two views beside each other have the same marks
+  const [first, second] = [0, 1].map(() => layer.appendChild(document.createElement("div")));
+  second.className = "photolin-second";
+  const grid = first.appendChild(document.createElement("div"));
   const readout = layer.appendChild(document.createElement("div"));
   readout.className = "photolin-readout";
   readout.style.cssText =
@@ -30,7 +33,7 @@ function openMarks({ viewer, layer, rows, columns, camera, relief }) {
   }
 
   function add(className, text) {
-    const element = layer.appendChild(document.createElement("div"));
+    const element = first.appendChild(document.createElement("div"));
     element.className = className;
     element.textContent = text;
     return element;
@@ -53,8 +56,14 @@ function openMarks({ viewer, layer, rows, columns, camera, relief }) {
   }
 
   function draw() {
+    const half = camera.half();
+    const view = (left) =>
+      `position:absolute;top:0;bottom:0;overflow:hidden;left:${left}px;width:${half ? `${half}px` : "100%"}`;
+    first.style.cssText = view(0);
+    second.style.cssText = view(half);
     if (camera.isOrbiting()) drawSolid();
     else drawFlat();
+    second.replaceChildren(...(half ? [...first.children].map((one) => one.cloneNode(true)) : []));
   }
 
   function drawFlat() {

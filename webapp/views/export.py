@@ -5,6 +5,7 @@ from collections.abc import Callable
 import viser
 
 from ..downloads import REPORT, SHAPE
+from ..figure import KINDS as FIGURES
 from ..values import choose_option
 
 RESULT = "result (npz and json, zip)"
@@ -17,7 +18,10 @@ KINDS = {
     RESULT: "result",
     PAGE: REPORT,
     SURFACE: SHAPE,
+    **{f"{kind} of the paper (PNG)": kind for kind in FIGURES},
 }
+FIXED = frozenset({"result", REPORT, SHAPE, *FIGURES})
+"""Kinds whose images are not chosen."""
 TEXT = """
 - **masks**: for each class a picture that is white where a pixel belongs to it
 - **label maps**: one picture for each image, in the colours of the legend; its pixel values are
@@ -31,6 +35,10 @@ TEXT = """
 - **shape**: what `photolin shape` writes, once the tab Shape has recovered one. normals.tif,
   albedo.tif and depth.tif are numbers, the PNGs to look at; mesh.ply and mesh.obj open in MeshLab
   or Blender; lights.lp is for RTI. x is right, y up, z to the camera
+- **figures**: of this stack, as in Mukaigawa et al. 2007. 6: label maps of this image by all
+  methods, and the truth where it is known. 8: base images as photographed, and linearized by all
+  methods; 15: linearized only. 10: this image, linearized, and where each class is, in black; 11:
+  the same of all images. Methods that have not run yet run first
 
 Labels are by T and Ts as the sliders stand, of the method shown. Files go where the browser keeps
 its downloads.
@@ -44,14 +52,14 @@ class ExportView:
     def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
         self._images = gui.add_dropdown(
-            "Of", (THIS, ALL), hint="Result, report and shape are of all images"
+            "Of", (THIS, ALL), hint="Result, report, shape and figures decide by themselves"
         )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         gui.add_markdown(TEXT)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
-            self._images.disabled = self._kind.value in (RESULT, SURFACE, PAGE)
+            self._images.disabled = self.chosen()[0] in FIXED
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:

@@ -20,6 +20,10 @@ gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and 
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 
+The tab *Compare* sets another layer, another method or the true labels beside what is shown: split
+at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
+turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
+
 | key | does |
 |---|---|
 | ← → | previous, next image |
@@ -32,16 +36,17 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 | M | next method |
 | P | pin the selected pixel to compare with |
 | X, U | next image where it is specular, undefined |
-| B | compare: all of one picture, all of the other |
+| B, Shift-B | compare: one picture alone and the other in turn, both again |
 | 1 … 5 | show or hide D, S, A, C, U |
 | space held | without overlay |
 | N | recover the shape, as the tab Shape says |
 | D | 3D, flat again |
 | F, G | fit, one image pixel on one screen pixel |
 | E | export as chosen |
-| Esc | cancel what is running |
+| Esc | cancel what is running, stop sampling |
 
-Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. In 3D left-drag
+Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. While samples are
+taken a left-drag draws a rectangle, and Shift-drag or right-drag moves. In 3D left-drag
 turns, right-drag moves, the wheel zooms, a click selects the pixel, F and a double click look from
 the front again.
 Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in

@@ -33,6 +33,26 @@ class PixelView:
         async def _(_: viser.GuiEvent) -> None:
             changed()
 
+    def add_choice(self, gui: viser.GuiApi) -> None:
+        """Offer the compared method in a second place too, where pictures are compared."""
+        twin = self._twin = gui.add_dropdown(
+            "By method",
+            CHOICES,
+            initial_value=ALONE,
+            hint="Whose result the right picture is of; the same choice as Compare with in the "
+            "tab Tune",
+        )
+
+        @twin.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if self._beside.value != twin.value:
+                self._beside.value = twin.value
+
+        @self._beside.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            if twin.value != self._beside.value:
+                twin.value = self._beside.value
+
     def restore(self, state: ViewState) -> None:
         """Set the compared method of a state."""
         self._beside.value = ALONE if state.beside is None else state.beside

@@ -1,162 +1,236 @@
 """Ts the paper's way, from pixels that someone points out, and T from the residuals."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import replace
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from photolin.analysis import Analysis
-from photolin.factors import Thresholds
+from photolin.residuals import Residuals, measure_residuals
 from photolin.shadow_level import ShadowLevel, sample_shadow_level
-from photolin.stack import ImageStack
 
+from ..box import Box, box_around
+from ..canvas import Canvas
 from ..clicks import Clicks
 from ..frame import Frame
-from ..histograms import plot_residuals, plot_samples, residuals_below
-from ..readout import escape
+from ..histograms import plot_residuals, plot_samples
+from ..readout import tell_threshold
+from ..sampling import (
+    COLOURS,
+    NAMES,
+    WANTED,
+    Kind,
+    Sample,
+    pool_samples,
+    take_sample,
+    tell_level,
+    tell_sampling,
+)
 from ..state import Pixel
 from . import INDENT
 from .watched import Watched
 
-SHADOW, LIT, UNDO, STOP = "shadow", "lit", "undo", "stop"
-Kind = Literal["shadow", "lit"]
+START, UNDO, CLEAR = "sample", "undo", "clear"
 SIDES = {"1 pixel": 0, "5 x 5": 2, "15 x 15": 7, "41 x 41": 20}
 """What a click takes, and how far it reaches from the pixel."""
-
-
-@dataclass(frozen=True)
-class Click:
-    """One click that takes samples."""
-
-    kind: Kind
-    image: int
-    pixel: Pixel
-    reach: int
-    """Pixels around it."""
+MOST_SAMPLES = 200
+FULL = f"{MOST_SAMPLES} samples are the most; undo or clear some"
+OUTSIDE = "No pixel of the mask lies there"
 
 
 class SamplesView(Watched):
-    """Clicks on shadows and on lit pixels, their histogram, and the Ts between them."""
+    """Rectangles and clicks on shadows and lit pixels, their histogram, and the Ts between.
+
+    Sampling pauses while the panel is out of view: drags then move the picture, as they do in all
+    other panels.
+    """
 
     def __init__(
         self,
         gui: viser.GuiApi,
         clicks: Clicks,
-        stack: ImageStack,
+        canvas: Canvas,
         changed: Callable[[], None],
-        apply: Callable[[float], None],
+        set_T: Callable[[float], None],
+        set_Ts: Callable[[float], None],
     ) -> None:
-        super().__init__(clicks, "samples")
-        self._stack, self._changed = stack, changed
+        """Build it.
+
+        Args:
+            changed: asks that `redraw` is called soon, by the thread that draws.
+            set_T, set_Ts: move the sliders.
+        """
+        self._changed, self._canvas = changed, canvas
         self._picking: Kind | None = None
-        self._clicks: tuple[Click, ...] = ()
-        self._residuals: tuple[Analysis, float, NDArray[np.float32]] | None = None
-        gui.add_markdown(
-            "Click **shadows** in some images, and **lit** pixels if you like: Ts is put between "
-            "both. Below: what is darker than the fit can only be noise, and T should let most of "
-            "it pass."
-        )
-        self._kind = gui.add_button_group(
-            "Click on picture",
-            (SHADOW, LIT, UNDO, STOP),
-            hint="shadow, lit: what the next clicks on the picture point out. undo: forget the "
-            "last click. stop: clicks select pixels again",
-        )
+        self._samples: tuple[Sample, ...] = ()
+        self._note = ""
+        self._stale = False
+        self._sketched: tuple[object, ...] = (None, ())
+        self._level: ShadowLevel | None = None
+        self._residuals: tuple[Analysis, float, Residuals] | None = None
+        super().__init__(clicks, "samples")
+        gui.add_markdown("**Ts** from pixels in **shadow**; **lit** ones help.")
+        self._kinds = {kind: self._add_kind(gui, kind) for kind in NAMES}
         self._side = gui.add_dropdown(
             "A click takes", tuple(SIDES), initial_value="5 x 5", hint="Pixels around the click"
         )
-        self._told = gui.add_html("")
-        self._apply = gui.add_button(
-            "Set Ts", hint="Move the slider Ts to the level found; Z undoes it"
+        self._stop = gui.add_button(
+            "Stop sampling", disabled=True, hint="Drags move the picture, clicks select (key: Esc)"
         )
+        self._told = gui.add_html("")
+        self._set_Ts = gui.add_button(
+            "Set Ts",
+            disabled=True,
+            hint="Move the slider Ts to the level found, close above the shadows; Z undoes it",
+        )
+        gui.add_markdown("**T** from the noise: what is darker than the fit.")
         self._plot = gui.add_html(f'<div id="{self._id}"></div>')
+        self._set_T = gui.add_button(
+            "Set T",
+            disabled=True,
+            hint="Move the slider T to the level found, about 1.4 standard deviations of the "
+            "noise: a larger T takes highlights for diffuse. Passed: share of the observations "
+            "below the fit that T takes for diffuse. S sets T and Ts from the data; Z undoes it",
+        )
+        self._listen(set_T, set_Ts)
 
-        @self._kind.on_click
+    def _add_kind(self, gui: viser.GuiApi, kind: Kind) -> viser.GuiButtonGroupHandle:
+        """The buttons of one kind."""
+        group = gui.add_button_group(
+            NAMES[kind],
+            (START, UNDO, CLEAR),
+            hint=f"sample: drag rectangles over {WANTED[kind]}, or click them. undo: forget the "
+            "last sample of this kind. clear: forget all",
+        )
+
+        @group.on_click
         async def _(_: viser.GuiEvent) -> None:
-            self._begin(self._kind.value)
+            self._do(kind, group.value)
 
-        @self._apply.on_click
+        return group
+
+    def _listen(self, set_T: Callable[[float], None], set_Ts: Callable[[float], None]) -> None:
+        @self._stop.on_click
         async def _(_: viser.GuiEvent) -> None:
-            if (level := self.level()) is not None:
-                apply(level.Ts)
+            self.stop()
 
-    @property
-    def marks(self) -> tuple[tuple[int, int, str], ...]:
-        """(row, column, text) of the clicks in the image shown."""
-        image = self._image()
-        here = [click for click in self._clicks if click.image == image]
-        return tuple((*click.pixel, click.kind) for click in here)
+        @self._set_Ts.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            if self._level is not None:
+                set_Ts(self._level.Ts)
+
+        @self._set_T.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            if self._residuals is not None:
+                set_T(self._residuals[2].T)
+
+    # --- what is sampled ---
 
     def take(self, pixel: Pixel) -> bool:
-        """Take a click while samples are being clicked; whether it was taken."""
-        if self._picking is None:
+        """Take the pixels around a click while sampling; whether they were taken."""
+        if self._frame is None:
             return False
         reach = SIDES.get(self._side.value, 0)
-        self._clicks = (*self._clicks, Click(self._picking, self._image(), pixel, reach))
-        self._changed()
+        return self.take_box(box_around(pixel, reach, self._frame.stack.shape[1:]))
+
+    def take_box(self, box: Box) -> bool:
+        """Take the mask pixels of a box in the image shown, while sampling; whether it was."""
+        kind, frame = self._sampling(), self._frame
+        if kind is None or frame is None:
+            return False
+        found = take_sample(frame.stack, kind, frame.state.image, box)
+        sample = None if found is None else replace(found, image=number_of(frame))
+        if sample is None:
+            self._note = OUTSIDE
+        elif len(self._samples) >= MOST_SAMPLES:
+            self._note = FULL
+        else:
+            self._note = ""
+            self._samples = (*self._samples, sample)
+        self._change()
         return True
 
-    def level(self) -> ShadowLevel | None:
-        """The Ts that the clicks stand for; None without a click on a shadow."""
-        shadows, lit = self._sampled(SHADOW), self._sampled(LIT)
-        return sample_shadow_level(shadows, lit) if shadows.size else None
+    def stop(self) -> None:
+        """Let clicks and drags on the picture do what they do elsewhere."""
+        self._picking = None
+        self._change()
 
-    def _image(self) -> int:
-        """Number of the image shown."""
-        return 0 if self._frame is None else self._frame.state.image
+    def _do(self, kind: Kind, what: str) -> None:
+        own = [sample for sample in self._samples if sample.kind == kind]
+        if what == START:
+            self._picking = kind
+        elif what == UNDO:
+            own = own[-1:]
+        if what != START:
+            self._samples = tuple(sample for sample in self._samples if sample not in own)
+        self._note = ""
+        self._change()
+
+    def _sampling(self) -> Kind | None:
+        """The kind that is being sampled; None while none is, or nobody sees the panel."""
+        return self._picking if self._shown else None
+
+    # --- drawing ---
+
+    def redraw(self) -> None:
+        """Show what was sampled since; from the thread that draws."""
+        if self._stale and self._frame is not None:
+            self._stale = False
+            self.draw(self._frame)
+
+    def draw(self, frame: Frame) -> None:
+        """Show a frame, and outline the samples of its image."""
+        super().draw(frame)
+        kind = self._sampling()
+        here = self._samples if kind is not None else ()
+        boxes = tuple((s.box, COLOURS[s.kind]) for s in here if s.image == number_of(frame))
+        if (kind, boxes) != self._sketched:
+            self._sketched = (kind, boxes)
+            self._canvas.set_sampling(None if kind is None else COLOURS[kind])
+            self._canvas.set_boxes(boxes)
+
+    def _see(self, shown: bool) -> None:
+        self._shown = shown
+        self._change()
+
+    def _change(self) -> None:
+        self._stale = True
+        self._changed()
 
     def _show(self, frame: Frame) -> None:
         """Draw both histograms and say what they stand for."""
-        T = frame.state.thresholds
-        shadows, lit = self._sampled(SHADOW), self._sampled(LIT)
-        level = sample_shadow_level(shadows, lit) if shadows.size else None
-        parts = []
+        now = frame.state.thresholds
+        samples = self._samples
+        shadows, lit = (pool_samples(samples, kind) for kind in NAMES)
+        self._level = level = sample_shadow_level(shadows, lit) if shadows.size else None
+        told = [*tell_sampling(self._picking, samples, self._note)]
         if level is not None:
-            parts.append(plot_samples(shadows, lit, level.Ts))
-        if frame.analysis is not None:
-            parts.append(plot_residuals(self._below(frame, frame.analysis), T))
-        self._plot.content = f'<div id="{self._id}" style="{INDENT}">{"".join(parts)}</div>'
-        told = self._tell(level, shadows.size, lit.size, T)
-        self._told.content = f'<div style="{INDENT};font-size:0.8em">{escape(told)}</div>'
+            told += [plot_samples(shadows, lit, level.Ts, now.Ts), tell_level(level, now.Ts)]
+        self._told.content = (
+            f'<div style="{INDENT};padding-bottom:0.3em;font-size:0.8em">{"".join(told)}</div>'
+        )
+        self._stop.disabled = self._picking is None
+        self._set_Ts.disabled = level is None
+        self._set_Ts.label = "Set Ts" if level is None else f"Set Ts to {tell_threshold(level.Ts)}"
+        plot = "" if frame.analysis is None else self._plot_residuals(frame, frame.analysis)
+        self._plot.content = f'<div id="{self._id}" style="{INDENT}">{plot}</div>'
 
-    def _below(self, frame: Frame, analysis: Analysis) -> NDArray[np.float32]:
-        """Residuals below the fit, computed once for each result and Ts."""
-        Ts = frame.state.thresholds.Ts
+    def _plot_residuals(self, frame: Frame, analysis: Analysis) -> str:
+        """Measured once for each result and Ts."""
+        T, Ts = frame.state.thresholds.T, frame.state.thresholds.Ts
         if self._residuals is None or self._residuals[:2] != (analysis, Ts):
-            self._residuals = (analysis, Ts, residuals_below(frame.stack, analysis, Ts))
-        return self._residuals[2]
+            found = measure_residuals(frame.stack, analysis, Ts)
+            self._residuals = (analysis, Ts, found)
+        residuals = self._residuals[2]
+        passed = f" ({residuals.passed(residuals.T):.1%} passed)" if residuals.values.size else ""
+        self._set_T.label = f"Set T to {residuals.T:.4f}{passed}"
+        self._set_T.disabled = False
+        return plot_residuals(residuals.values, residuals.T, T)
 
-    def _sampled(self, kind: str) -> NDArray[np.float32]:
-        """(N,) intensities of the mask pixels that clicks of a kind take."""
-        stack = self._stack
-        found = []
-        for click in self._clicks:
-            if click.kind == kind:
-                (row, column), r = click.pixel, click.reach
-                part = np.s_[max(row - r, 0) : row + r + 1, max(column - r, 0) : column + r + 1]
-                found.append(stack.images[click.image][part][stack.mask[part]])
-        return np.concatenate(found) if found else np.empty(0, np.float32)
 
-    def _tell(
-        self, level: ShadowLevel | None, shadows: int, lit: int, thresholds: Thresholds
-    ) -> str:
-        doing = {
-            None: "Clicks select pixels.",
-            SHADOW: "Click shadows.",
-            LIT: "Click lit pixels, dim ones too.",
-        }[self._picking]
-        if level is None:
-            return f"{doing} No shadow sampled yet."
-        wrong = f", {level.error:.1%} on the wrong side" if lit else ""
-        counts = f"{shadows} {SHADOW}, {lit} {LIT} sampled"
-        return f"{doing} {counts}: Ts {level.Ts:.4f}{wrong} (now {thresholds.Ts:.4f})."
-
-    def _begin(self, what: str) -> None:
-        if what == UNDO:
-            self._clicks = self._clicks[:-1]
-        else:
-            self._picking = SHADOW if what == SHADOW else LIT if what == LIT else None
-        self._changed()
+def number_of(frame: Frame) -> int:
+    """Number of the image shown among all images, those too that are left out."""
+    number = frame.state.image
+    for excluded in sorted(frame.excluded):
+        number += excluded <= number
+    return number

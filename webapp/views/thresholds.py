@@ -132,6 +132,10 @@ class ThresholdView:
             handle.min, handle.max = min(handle.min, value), max(handle.max, value)
             handle.value = value
 
+    def set_T(self, T: float) -> None:
+        """Move the slider T."""
+        self.set(replace(self.read(ViewState()).thresholds, T=T))
+
     def set_Ts(self, Ts: float) -> None:
         """Move the slider Ts."""
         self.set(replace(self.read(ViewState()).thresholds, Ts=Ts))
