@@ -23,7 +23,7 @@ def is_uneven(gain: NDArray[np.floating]) -> bool:
 
 
 def doubt_powers(
-    lights: NDArray[np.floating], names: tuple[str, ...], coefficients: NDArray[np.floating]
+    lights: NDArray[np.floating], names: tuple[str, ...], coefficients: NDArray[np.float64]
 ) -> list[str]:
     """A sentence where the images contradict the powers of their lights.
 

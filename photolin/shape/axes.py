@@ -61,10 +61,10 @@ def doubt_axes(
     n, by_x, by_y = (v @ to_normal.T for v in (smooth.values, smooth.by_x, smooth.by_y))
     size = np.square(smooth.values).sum(axis=1)
     misfit = measure_misfit(n, by_x, by_y, size)
-    each = {
-        change: measure_misfit(*(v @ np.array(mend).T for v in (n, by_x, by_y)), size)
-        for change, mend in CHANGES.items()
-    }
+    each: dict[str, float] = {}
+    for change, mend in CHANGES.items():
+        turn = np.array(mend).T
+        each[change] = measure_misfit(n @ turn, by_x @ turn, by_y @ turn, size)
     best = min(each, key=lambda change: each[change])
     if not (each[best] < BETTER * misfit and each[best] < FITTING):
         return ""

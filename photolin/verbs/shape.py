@@ -189,7 +189,7 @@ def measure_colour(
         return None
     colour = np.stack(planes, axis=2)
     # where no observation is D, as in dark creases, nothing tells the colour
-    return np.where(np.isnan(colour).any(axis=2)[..., None], found.albedo[..., None], colour)
+    return np.where(np.isnan(colour).any(axis=2, keepdims=True), found.albedo[..., None], colour)
 
 
 def lights(
