@@ -10,7 +10,7 @@ import viser
 from browser import wait_until
 
 from webapp.access import Server, open_server
-from webapp.clicks import Click, Clicks, Drag, Sight, event_in_text
+from webapp.clicks import Choice, Click, Clicks, Drag, Sight, event_in_text
 
 
 @pytest.mark.parametrize(
@@ -21,9 +21,14 @@ from webapp.clicks import Click, Clicks, Drag, Sight, event_in_text
         ("2 map by -0.2500,1.0000", Drag("map", -0.25, 1)),
         ("7 map shown", Sight("map", True)),
         ("8 map hidden", Sight("map", False)),
+        ("9 strip image-0", Choice("strip", "image", 0)),
+        ("9 strip shown-000012", Choice("strip", "shown", 12)),
+        ("9 a-b abcdefghijkl-999999", Choice("a-b", "abcdefghijkl", 999999)),
     ],
 )
-def test_an_event_is_read_as_the_page_writes_it(text: str, event: Click | Drag | Sight) -> None:
+def test_an_event_is_read_as_the_page_writes_it(
+    text: str, event: Click | Choice | Drag | Sight
+) -> None:
     assert event_in_text(text) == event
 
 
@@ -55,6 +60,19 @@ def test_an_event_is_read_as_the_page_writes_it(text: str, event: Click | Drag |
         "1 <b> 0.5,0.5",
         "1 map shown hidden",
         "1 map seen",
+        "1 strip image",
+        "1 strip image-",
+        "1 strip -3",
+        "1 strip image--3",
+        "1 strip image-1.5",
+        "1 strip image-1000000",
+        "1 strip image-٣",
+        "1 strip Image-3",
+        "1 strip abcdefghijklm-3",
+        "1 strip image-3 image-4",
+        "1 strip by image-3",
+        "1 strip image-3\n",
+        "1 strip <b>-3",
         "1 map 0.٣,0.5",
         "٣ map 0.5,0.5",
         "1 " + "m" * 41 + " shown",
@@ -182,3 +200,39 @@ def test_a_tab_that_lost_its_connection_is_watched_again(page: Any, stage: Stage
     wait_until(lambda: len(stage.clicks) == 1)
     page.wait_for_timeout(200)
     assert len(stage.clicks) == 1
+
+
+PARTS = (
+    '<div id="{}"><div data-part="image-7" style="width:120px;height:60px"><span>seven</span>'
+    '<b data-part="toggle-7">x</b></div><i>{}</i></div><p data-part="image-8">beside</p>'
+)
+
+
+@pytest.mark.browser
+def test_the_innermost_part_that_is_clicked_is_told(page: Any) -> None:
+    server, chosen, clicks = open_server(port=0), [], []
+
+    def connect(client: viser.ClientHandle) -> None:
+        html = client.gui.add_html("")
+        name = Clicks(client).watch_parts(
+            "strip", lambda part, number: chosen.append((part, number)), clicks.append
+        )
+        html.content = PARTS.format(name, "none")
+
+    server.server.on_client_connect(connect)
+    try:
+        page.goto(server.url)
+        expected: list[tuple[str, int]] = []
+        for text, part in [
+            ("seven", ("image", 7)),
+            ("x", ("toggle", 7)),
+            ("beside", None),
+            ("none", None),
+            ("seven", ("image", 7)),
+        ]:
+            page.get_by_text(text, exact=True).click()
+            expected += [part] if part else []
+            wait_until(lambda: chosen == expected)  # noqa: B023
+        assert clicks == [True]
+    finally:
+        server.stop()

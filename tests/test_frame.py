@@ -9,6 +9,7 @@ from photolin.analysis import Options
 from photolin.factors import OUTSIDE, Factor, Thresholds
 from photolin.follow import follow_thresholds, prepare_ground
 from photolin.label import label_images
+from photolin.overview import count_classes
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import compose, pixel_values
@@ -144,3 +145,49 @@ def test_a_preview_of_a_part_is_not_laid_over_another_result() -> None:
     frame = compose(RUNS, {"robust": newer}, state, preview)
     assert frame.analysis is newer
     assert np.array_equal(frame.labels, compose(RUNS, RESULTS, state).labels)
+
+
+# How often
+
+
+def test_counts_are_there_while_their_layer_is_and_are_the_backends() -> None:
+    for T, Ts in [(0.05, 0.02), (0.004, 0.2)]:
+        state = ViewState(T=T, Ts=Ts, layer="how often", often="lit")
+        frame = compose(RUNS, RESULTS, state)
+        labels = label_images(
+            STACK.images,
+            ROBUST.linearized_bases,
+            ROBUST.coefficients,
+            STACK.mask,
+            Thresholds(T, Ts),
+        )
+        expected = count_classes(labels, Factor.DIFFUSE, Factor.SPECULAR)
+        assert frame.often is not None
+        assert np.array_equal(frame.often, expected)
+        assert frame.beside_often is None
+        assert compose(RUNS, RESULTS, replace(state, layer="input")).often is None
+        assert compose(RUNS, {}, state).often is None
+        beside = replace(state, layer="input", against="how often", beside="statistical")
+        frame = compose(RUNS, RESULTS, beside)
+        assert np.array_equal(frame.often, expected)
+        assert frame.beside_often is not None
+        assert not np.array_equal(frame.beside_often, expected)
+
+
+def test_counts_of_an_earlier_frame_are_taken_only_where_they_are_right() -> None:
+    state = ViewState(T=0.05, Ts=0.02, layer="how often", often="specular")
+    before = compose(RUNS, RESULTS, state)
+    again = compose(RUNS, RESULTS, replace(state, image=4, opacity=0.1), before=before)
+    assert again.often is before.often
+    newer = {"robust": replace(ROBUST, labels=ROBUST.labels[::-1].copy())}
+    for results, change in [
+        (RESULTS, {"T": 0.004}),
+        (RESULTS, {"Ts": 0.3}),
+        (RESULTS, {"often": "any shadow"}),
+        (RESULTS, {"method": "statistical"}),
+        (newer, {}),
+    ]:
+        changed = replace(state, **change)  # pyright: ignore
+        found = compose(RUNS, results, changed, before=before)  # pyright: ignore
+        assert found.often is not before.often
+        assert np.array_equal(found.often, compose(RUNS, results, changed).often)  # pyright: ignore

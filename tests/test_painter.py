@@ -10,6 +10,7 @@ from PIL import Image
 
 from photolin.analysis import Options
 from photolin.factors import PALETTE, Factor
+from photolin.overview import count_classes
 from photolin.pipeline import analyze
 from photolin.shape.recover import Shape, recover_shape
 from photolin.shape.resolve import resolve_ambiguity
@@ -17,6 +18,7 @@ from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp import painter as module
 from webapp.frame import Frame, Recovered, compose
+from webapp.often import render_often
 from webapp.painter import Painter, describe, render_layer
 from webapp.render import choose_scale, render_residual
 from webapp.runs import Runs
@@ -131,6 +133,8 @@ def test_the_first_frame_draws_everything_and_the_same_again_nothing(
         ({"outlines": True}, {"overlay"}),
         ({"shown": frozenset({Factor.CAST})}, {"overlay"}),
         ({"layer": "labels"}, {"base png", "overlay"}),
+        ({"layer": "how often"}, {"base png", "overlay"}),
+        ({"often": "lit"}, set()),
         ({"layer": "residual"}, {"base png", "overlay"}),
         ({"layer": "residual", "outlines": True}, {"base png", "overlay"}),
         ({"gain": 2.0}, {"base png"}),
@@ -431,3 +435,45 @@ def test_before_there_is_a_result_the_truth_alone_has_labels(
     assert canvas.readout == "left: robust, input\nright: robust, labels"
     assert (draw("truth", None)["other overlay"] == (*PALETTE[Factor.CAST], 255)).all()
     assert canvas.readout == "left: robust, input\nright: truth"
+
+
+def test_how_often_is_of_all_images_and_drawn_once_whichever_is_shown(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    shown = frame(layer="how often", often="any shadow")
+    counts = count_classes(RESULT.labels, Factor.ATTACHED, Factor.CAST)
+    painter.paint(shown, None, rested=True)
+    assert np.array_equal(canvas.take()["base png"], render_often(counts, STACK.mask))
+    most = counts.max()
+    assert canvas.readout == f"any shadow in 0 ... {most} of 8 images, dark purple to yellow"
+    row, column = np.argwhere(counts == most)[0].tolist()
+    painter.paint(frame(layer="how often", often="any shadow", image=3), (row, column), rested=True)
+    assert set(canvas.take()) <= {"overlay"}
+    assert canvas.readout == f"row {row}  column {column}  any shadow in {most} of 8 images"
+    painter.paint(frame(layer="how often", often="lit", image=3), None, rested=True)
+    assert "base png" in canvas.take()
+    assert painter._encoded == {}  # it belongs to a result, which must not be kept alive
+    mask = STACK.mask.copy()
+    mask[0] = False
+    words = describe(frame(replace(STACK, mask=mask), layer="how often"), (0, 5))
+    assert words == "row 0  column 5  outside the mask"
+
+
+def test_how_often_shows_the_image_itself_until_there_is_a_result(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    for image in (0, 3):
+        painter.paint(frame(solved=False, layer="how often", image=image), None, rested=True)
+        expected = render_layer(frame(image=image))[0]
+        assert np.array_equal(canvas.take()["base png"], expected)
+
+
+def test_how_often_is_compared_by_both_methods(painter: Painter, canvas: FakeCanvas) -> None:
+    other = analyze(STACK, Options(method="statistical", T=0.05, Ts=0.02, samples=50))
+    state = ViewState(
+        T=0.05, Ts=0.02, layer="how often", against="how often", beside="statistical", divider=0
+    )
+    results = {"robust": RESULT, "statistical": other}
+    painter.paint(compose(Runs(STACK, Options()), results, state), None, rested=True)  # pyright: ignore
+    expected = render_often(count_classes(other.labels, Factor.SPECULAR), STACK.mask)
+    assert np.array_equal(canvas.take()["other png"], expected)

@@ -17,6 +17,7 @@ SHAPE = (10, 20, 30)
 STATE = ViewState(
     image=7,
     layer="residual",
+    often="any shadow",
     method="classification",
     beside="statistical",
     T=0.1 + 0.2,
@@ -106,6 +107,7 @@ def test_numbers_are_brought_into_their_range(name: str, value: object, becomes:
         *(("live", value) for value in (1, "yes", None)),
         ("gain", "bright"),
         ("encoding", "gif"),
+        *(("often", value) for value in ("never", 3, None, ["lit"])),
     ],
 )
 def test_an_entry_that_cannot_be_is_as_at_first_and_told(name: str, value: object) -> None:

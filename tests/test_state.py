@@ -23,7 +23,7 @@ def test_every_field_changes_the_state():
         "opacity": 0.3, "shown": frozenset(), "outlines": True, "pixel": (0, 0), "gain": 2.0,
         "live": False, "encoding": "exact (PNG)", "beside": "statistical",
         "against": "truth", "divider": 0.2, "arrangement": "left", "pins": ((1, 2),),
-        "relief": True, "arrows": False, "light": (0.1, 0.2),
+        "relief": True, "arrows": False, "light": (0.1, 0.2), "often": "lit",
     }  # fmt: skip
     assert set(changed) == set(asdict(ViewState()))
     for name, value in changed.items():
@@ -54,8 +54,8 @@ def test_each_layer_is_accepted(layer):
         ({"image": -1}, "image is -1; accepted is a number from 0"),
         (
             {"layer": "bases"},
-            "layer is 'bases'; accepted are input, linearized, residual, labels, albedo, "
-            "normals, depth, relit",
+            "layer is 'bases'; accepted are input, linearized, residual, labels, how often, "
+            "albedo, normals, depth, relit",
         ),
         (
             {"method": "best"},
@@ -63,8 +63,13 @@ def test_each_layer_is_accepted(layer):
         ),
         (
             {"against": "bases"},
-            "against is 'bases'; accepted are input, linearized, residual, labels, albedo, "
-            "normals, depth, relit, truth",
+            "against is 'bases'; accepted are input, linearized, residual, labels, how often, "
+            "albedo, normals, depth, relit, truth",
+        ),
+        (
+            {"often": "never"},
+            "often is 'never'; accepted are specular, lit, attached shadow, cast shadow, "
+            "any shadow, undefined",
         ),
         (
             {"arrangement": "over"},

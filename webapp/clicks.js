@@ -31,6 +31,8 @@ window.openClicks = ({ fieldId }) => {
     for (const name of watched.keys()) {
       const element = find(name);
       if (!element?.contains(event.target)) continue;
+      const part = event.target.closest("[data-part]");
+      if (part && element.contains(part)) return report(`${name} ${part.dataset.part}`);
       const box = element.getBoundingClientRect();
       const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
       if (x >= 0 && x < 1 && y >= 0 && y < 1) report(`${name} ${x.toFixed(4)},${y.toFixed(4)}`);

@@ -28,6 +28,16 @@ class Click(NamedTuple):
     """From its upper border to its lower, 0 to 1."""
 
 
+class Choice(NamedTuple):
+    """A click on a numbered part of an element."""
+
+    name: str
+    part: str
+    """What kind of part it is, small letters."""
+    number: int
+    """Up to six digits; whether there is such a part is for the caller to say."""
+
+
 class Drag(NamedTuple):
     """The pointer moved while it held an element."""
 
@@ -51,6 +61,7 @@ class Clicks:
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
         self._clicked: dict[str, Callable[[float, float], None]] = {}
+        self._chosen: dict[str, Callable[[str, int], None]] = {}
         self._dragged: dict[str, Callable[[float, float], None]] = {}
         self._seen: dict[str, Callable[[bool], None]] = {}
         self._field = client.gui.add_text("clicks", "", visible=False)
@@ -62,6 +73,8 @@ class Clicks:
             match event_in_text(self._field.value):
                 case Click(name, x, y) if name in self._clicked:
                     self._clicked[name](x, y)
+                case Choice(name, part, number) if name in self._chosen:
+                    self._chosen[name](part, number)
                 case Drag(name, right, down) if name in self._dragged:
                     self._dragged[name](right, down)
                 case Sight(name, shown) if name in self._seen:
@@ -84,6 +97,26 @@ class Clicks:
         self._clicked[name], self._seen[name] = clicked, seen
         call_javascript(self._client, "window.photolinClicks.watch", name)
         return f"photolin-{name}"
+
+    def watch_parts(
+        self, name: str, chosen: Callable[[str, int], None], seen: Callable[[bool], None]
+    ) -> str:
+        """Call back with which part of an element is clicked.
+
+        Parts say what they are in an attribute: data-part="image-12" is the part "image" with the
+        number 12. Of parts within each other the innermost counts.
+
+        Args:
+            name: as `watch` takes it.
+            chosen: called with what the page says: 1 to 12 small letters, and a number from 0 to
+                999999. There need not be such a part.
+            seen: as `watch` takes it.
+
+        Returns:
+            As `watch`.
+        """
+        self._chosen[name] = chosen
+        return self.watch(name, _ignore, seen)
 
     def see(self, name: str, seen: Callable[[bool], None]) -> str:
         """`watch` without clicks."""
@@ -109,14 +142,18 @@ def _ignore(x: float, y: float) -> None:
     """Clicks on an element that is only looked at."""
 
 
-def event_in_text(text: str) -> Click | Drag | Sight | None:
-    """What the page wrote: a number, a name, and "x,y", "by right,down", "shown" or "hidden"."""
+def event_in_text(text: str) -> Click | Choice | Drag | Sight | None:
+    """What the page wrote: a number, a name, and "x,y", "part-number", "by right,down", "shown" or
+    "hidden"."""
     found = re.fullmatch(r"[0-9]{1,9} ([a-z-]{1,40}) (by )?(.{1,30})", text, re.ASCII)
     if found is None:
         return None
     name, by, rest = found.groups()
     if rest in ("shown", "hidden") and by is None:
         return Sight(name, rest == "shown")
+    part = re.fullmatch(r"([a-z]{1,12})-([0-9]{1,6})", rest, re.ASCII)
+    if part is not None and by is None:
+        return Choice(name, part[1], int(part[2]))
     number = r"(-?[01]\.[0-9]{1,6})"
     pair = re.fullmatch(f"{number},{number}", rest, re.ASCII)
     if pair is None:

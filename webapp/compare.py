@@ -36,8 +36,14 @@ def other_frame(frame: Frame) -> Frame | None:
     shown = replace(state, layer=state.against, against=None)
     if frame.beside is None:
         return replace(frame, state=shown)
-    labels = frame.beside_labels
-    return replace(frame, state=shown, analysis=frame.beside, labels=labels, preview=None)
+    return replace(
+        frame,
+        state=shown,
+        analysis=frame.beside,
+        labels=frame.beside_labels,
+        often=frame.beside_often,
+        preview=None,
+    )
 
 
 def mixture(frame: Frame, other: Frame) -> tuple[object, ...]:
@@ -45,7 +51,7 @@ def mixture(frame: Frame, other: Frame) -> tuple[object, ...]:
     s = frame.state
     divider = s.divider if s.arrangement == "split" else None
     how = (s.against, s.arrangement, divider, s.shown, s.opacity, s.thresholds, s.light)
-    return (*how, frame.analysis, other.analysis, frame.preview, frame.shape)
+    return (*how, s.often, frame.analysis, other.analysis, frame.preview, frame.shape)
 
 
 def lay_together(frame: Frame, other: Frame) -> tuple[NDArray[np.uint8], str]:

@@ -13,6 +13,7 @@ from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 from .live import Preview
+from .often import count_often
 from .runs import Runs
 from .state import ViewState
 
@@ -47,6 +48,10 @@ class Frame:
     """Images that the stack is without, numbers of the whole one."""
     truth: NDArray[np.uint8] | None = None
     """(K,H,W) true Factor codes; None where they are not known."""
+    often: NDArray[np.uint16] | None = None
+    """(H,W): in how many images a pixel is what `state.often` says; None where nobody looks."""
+    beside_often: NDArray[np.uint16] | None = None
+    """The same by the method compared with."""
 
     @property
     def shape(self) -> Shape | None:
@@ -72,12 +77,14 @@ def compose(
     state: ViewState,
     preview: Preview | None = None,
     recovered: Recovered | None = None,
+    before: Frame | None = None,
 ) -> Frame:
     """The frame of a view.
 
     Args:
         runs: where the results come from.
         preview: takes the place of the result of the method shown, as far as it goes.
+        before: an earlier frame, whose counts over all images are taken where they are right.
     """
     stack, analysis = runs.stack, results.get(state.method)
     if preview is not None and (whole := preview.whole()) is not None:
@@ -99,7 +106,28 @@ def compose(
         recovered,
         runs.excluded,
         runs.truth,
+        _count(stack, analysis, state, before, "how often" in (state.layer, state.against)),
+        _count(stack, beside, state, before, state.against == "how often"),
     )
+
+
+def _count(
+    stack: ImageStack,
+    analysis: Analysis | None,
+    state: ViewState,
+    before: Frame | None,
+    in_view: bool,
+) -> NDArray[np.uint16] | None:
+    """What the layer how often shows of one result, where it is in view."""
+    if analysis is None or not in_view:
+        return None
+    wanted = (state.thresholds, state.often)
+    if before is not None and (before.state.thresholds, before.state.often) == wanted:
+        pairs = ((before.analysis, before.often), (before.beside, before.beside_often))
+        for result, counts in pairs:
+            if result is analysis and counts is not None:
+                return counts
+    return count_often(stack, analysis, *wanted)
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frame import Frame
+from .often import caption_often, render_often
 from .render import choose_scale, render_input, render_linearized, render_residual
 from .state import SURFACE
 from .surface import render_surface
@@ -19,7 +20,12 @@ def hides_labels(frame: Frame) -> bool:
     """
     state = frame.state
     coloured = state.layer in SIGNED or (state.layer in SURFACE and frame.shape is not None)
-    return coloured and frame.labels is not None and not state.outlines
+    return (coloured or counts(frame)) and frame.labels is not None and not state.outlines
+
+
+def counts(frame: Frame) -> bool:
+    """Whether the picture is of all images at once, how often a pixel is something."""
+    return frame.state.layer == "how often" and frame.often is not None
 
 
 def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
@@ -27,6 +33,9 @@ def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
     state, stack = frame.state, frame.stack
     if state.layer in SURFACE and frame.shape is not None:
         return render_surface(frame.shape, state.layer, state.light, stack.mask)
+    if counts(frame) and frame.often is not None:
+        caption = caption_often(frame.often, len(stack.images), state.often)
+        return render_often(frame.often, stack.mask), caption
     if frame.analysis is None or state.layer not in SIGNED:
         gain = state.gain or 1.0
         shown = "" if gain == 1 else f", shown {gain:g} times brighter"

@@ -8,7 +8,7 @@ from photolin.factors import LETTERS, OUTSIDE, Factor
 from .canvas import Canvas
 from .compare import lay_together, mixture, other_frame
 from .frame import Frame
-from .layers import SIGNED, hides_labels, render_layer
+from .layers import SIGNED, counts, hides_labels, render_layer
 from .readout import status_line
 from .render import encode_jpeg, encode_labels, encode_png
 from .second import Second
@@ -48,6 +48,8 @@ class Sheet:
         shape = frame.shape if state.layer in SURFACE else None
         light = state.light if state.layer == "relit" else None
         look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
+        if counts(frame):  # of all images, whichever is shown
+            look = (state.layer, frame.analysis, state.thresholds, state.often)
         both = None if other is None else mixture(frame, other)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))
@@ -62,7 +64,7 @@ class Sheet:
     ) -> tuple[bytes, str]:
         """Bytes and legend of a picture; an input is encoded once, as long as it is a late one."""
         # others would keep results alive
-        kept = frame.state.layer not in (*SIGNED, *SURFACE) and other is None
+        kept = frame.state.layer not in (*SIGNED, *SURFACE) and not counts(frame) and other is None
         found = self._encoded.pop(key, None) if kept else None
         if found is None:
             picture, legend = render_layer(frame) if other is None else lay_together(frame, other)
@@ -189,6 +191,11 @@ def describe(frame: Frame, pixel: Pixel, other: Frame | None = None) -> str:
     The picture is told first, and what it is compared with next.
     """
     row, column = pixel
+    if counts(frame) and frame.often is not None:
+        if not frame.stack.mask[pixel]:
+            return f"row {row}  column {column}  outside the mask"
+        n, K = frame.often[pixel], len(frame.stack.images)
+        return f"row {row}  column {column}  {frame.state.often} in {n} of {K} images"
     i = float(frame.stack.images[frame.state.image, row, column])
     if frame.analysis is None or frame.labels is None:
         first = f"row {row}  column {column}  i {i:.3f}"

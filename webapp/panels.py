@@ -22,6 +22,7 @@ from .views.help import HelpView
 from .views.landscape import LandscapeView
 from .views.legend import LegendView
 from .views.notes import NotesView
+from .views.overview import OverviewView
 from .views.picture import PictureView
 from .views.pixel import PixelView
 from .views.run import RunView
@@ -72,11 +73,13 @@ class Panels:
         actions: Actions,
         *,
         known: bool,
+        whole: ImageStack,
     ) -> None:
         """Build them.
 
         Args:
             known: whether frames come with the truth.
+            whole: `stack` with the images that are left out.
             state: whose method and thresholds are set at first.
         """
         gui, changed = client.gui, actions.changed
@@ -94,6 +97,10 @@ class Panels:
                 self.legend = LegendView(gui, stack, changed)
             with gui.add_folder("About this result"):
                 summary = SummaryView(gui)
+        with tabs.add_tab("Overview", viser.Icon.PHOTO):
+            self.overview = OverviewView(
+                gui, clicks, whole, self.picture, changed, actions.exclude, actions.tell
+            )
         with tabs.add_tab("Samples", viser.Icon.CHART_HISTOGRAM):
             self.thresholds.add_steps(gui)
             setters = (self.thresholds.set_T, self.thresholds.set_Ts)
@@ -120,16 +127,17 @@ class Panels:
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)
-        self._readers = (self.run, *both, self.legend, self.compare, self.shape)
+        self._readers = (self.run, *both, self.legend, self.compare, self.shape, self.overview)
         self._drawers = (
             *(*both, self.samples, self.landscape, shares, summary),
-            *(self.diagnosis, self.cloud, self.compare, self.shape),
+            *(self.diagnosis, self.cloud, self.compare, self.shape, self.overview),
         )
         self._keys = self._bind(actions)
 
     def close(self) -> None:
         """Stop what panels compute."""
         self.landscape.close()
+        self.overview.close()
         self.cloud.close()
 
     def read(self, state: ViewState) -> ViewState:
@@ -186,6 +194,8 @@ class Panels:
             "m": self.run.turn,
             "r": actions.linearize,
             "s": actions.suggest,
+            "k": self.overview.leave_out,
+            "K": self.overview.take_all_in,
             "e": lambda: actions.download(*self.export.chosen()),
             "p": actions.pin,
             "b": self.compare.flicker,

@@ -90,7 +90,8 @@ class Session:
         self._painter = Painter(canvas)
         known = self._source.truth is not None
         stack = self._bench.runs.stack
-        self._panels = Panels(client, canvas, stack, state, self._actions(), known=known)
+        whole, actions = self._source.stack, self._actions()
+        self._panels = Panels(client, canvas, stack, state, actions, known=known, whole=whole)
         canvas.on_pick(self._pick)
         canvas.on_hover(pointing.hover)
         canvas.on_key(self._press)
@@ -231,7 +232,7 @@ class Session:
             and results is self._shown_results
         )
         if frame is None or not known or preview is not frame.preview:
-            self._frame = frame = compose(bench.runs, results, state, preview, recovered)
+            self._frame = frame = compose(bench.runs, results, state, preview, recovered, frame)
             self._shown_results = results
             rough = self._painter.paint(frame, pointing.pointer, marks, rested=rested)
             self._panels.draw(frame)

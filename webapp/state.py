@@ -7,7 +7,17 @@ from photolin.analysis import METHODS, Method
 from photolin.errors import OptionError
 from photolin.factors import Factor, Thresholds
 
-Layer = Literal["input", "linearized", "residual", "labels", "albedo", "normals", "depth", "relit"]
+Layer = Literal[
+    "input",
+    "linearized",
+    "residual",
+    "labels",
+    "how often",
+    "albedo",
+    "normals",
+    "depth",
+    "relit",
+]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 SURFACE: tuple[Layer, ...] = ("albedo", "normals", "depth", "relit")
 """Layers that are there once a shape is."""
@@ -17,8 +27,20 @@ TRUTH = "truth"
 AGAINST: tuple[Against, ...] = (*LAYERS, TRUTH)
 Arrangement = Literal["split", "side by side", "difference", "left", "right"]
 ARRANGEMENTS: tuple[Arrangement, ...] = get_args(Arrangement)
+Often = Literal["specular", "lit", "attached shadow", "cast shadow", "any shadow", "undefined"]
+OFTEN: tuple[Often, ...] = get_args(Often)
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
+CHOICES: dict[str, tuple[str, ...]] = {
+    "layer": LAYERS,
+    "often": OFTEN,
+    "method": METHODS,
+    "beside": METHODS,
+    "encoding": ENCODINGS,
+    "against": AGAINST,
+    "arrangement": ARRANGEMENTS,
+}
+"""Fields of a state that are one of some words, and the words."""
 
 Pixel = tuple[int, int]
 """(row, column)"""
@@ -32,7 +54,10 @@ class ViewState:
     image: int = 0
     """Image number, from 0."""
     layer: Layer = "input"
-    """The picture under the overlay; labels: the label map alone, opaque."""
+    """The picture under the overlay; labels: the label map alone, opaque; how often: in how many
+    images a pixel is what `often` says."""
+    often: Often = "specular"
+    """What the layer how often counts; lit: diffuse or specular."""
     method: Method = "robust"
     """Whose result is shown."""
     beside: Method | None = None
@@ -75,24 +100,18 @@ class ViewState:
         Thresholds(self.T, self.Ts)
         if self.image < 0:
             raise OptionError(f"image is {self.image}; accepted is a number from 0")
-        if self.layer not in LAYERS:
-            raise OptionError(f"layer is {self.layer!r}; accepted are {', '.join(LAYERS)}")
-        if self.method not in METHODS:
-            raise OptionError(f"method is {self.method!r}; accepted are {', '.join(METHODS)}")
-        if self.beside is not None and self.beside not in METHODS:
-            raise OptionError(f"beside is {self.beside!r}; accepted are {', '.join(METHODS)}")
-        if self.encoding not in ENCODINGS:
-            raise OptionError(f"encoding is {self.encoding!r}; accepted are {'; '.join(ENCODINGS)}")
+        for name, accepted in CHOICES.items():
+            value = getattr(self, name)
+            if value is None and name in ("beside", "against"):
+                continue
+            if value not in accepted:
+                listed = ("; " if "," in "".join(accepted) else ", ").join(accepted)
+                raise OptionError(f"{name} is {value!r}; accepted are {listed}")
         if not self.light[0] ** 2 + self.light[1] ** 2 < 1:
             raise OptionError(
                 f"light is {self.light}; accepted are x and y of a direction towards the camera's "
                 "side, of length below 1"
             )
-        if self.against is not None and self.against not in AGAINST:
-            raise OptionError(f"against is {self.against!r}; accepted are {', '.join(AGAINST)}")
-        if self.arrangement not in ARRANGEMENTS:
-            accepted = ", ".join(ARRANGEMENTS)
-            raise OptionError(f"arrangement is {self.arrangement!r}; accepted are {accepted}")
         if not 0 <= self.divider <= 1:
             raise OptionError(f"divider is {self.divider:g}; accepted is 0 to 1")
         if len(self.pins) > MOST_PINS or len(set(self.pins)) < len(self.pins):

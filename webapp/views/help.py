@@ -14,6 +14,11 @@ labels alone follow until you linearize again. The view *input* is the photograp
 what it would be with diffuse reflection alone (mid-grey is zero), *residual* the difference.
 Sentences in yellow under *About this result* say what is doubtful.
 
+The tab *Overview* shows all images at once, with the shares of their classes and with what is wrong
+with them: saturated, moved, a copy of another, another exposure, a bad fit. A click goes to an
+image, a click on its corner leaves it out or takes it in again; then all is linearized anew. The
+view *how often* shows in how many images each pixel is specular, lit or in shadow.
+
 The tab *Shape* goes on from there, to the surface and to the lights. It takes what is known of the
 scene: the lights, five points on a sphere, a whole sphere, or nothing; a click on *Recover shape*
 gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and *relit*. *relit* is
@@ -27,13 +32,14 @@ turn (key B). Tables tell how many labels differ. *Export* draws the figures of 
 | key | does |
 |---|---|
 | ← → | previous, next image |
-| ↑ ↓ | view: input, linearized, residual, labels, and those of a shape |
+| ↑ ↓ | view: input, linearized, residual, labels, how often, and those of a shape |
 | [ ] | T down, up |
 | { } | Ts down, up |
 | S | suggest T and Ts |
 | R | linearize again with T and Ts |
 | Z, Shift-Z | undo, redo a change of T or Ts |
 | M | next method |
+| K, Shift-K | leave this image out, take all images in again |
 | P | pin the selected pixel to compare with |
 | X, U | next image where it is specular, undefined |
 | B, Shift-B | compare: one picture alone and the other in turn, both again |

@@ -46,7 +46,8 @@ class PictureView:
             initial_value="input",
             hint="input: as photographed. linearized: diffuse reflection alone, signed, zero is "
             "mid-grey. residual: input minus linearized, zero is white. Both show labels only as "
-            "outlines. labels: the label map alone. Once a shape is there: its albedo, normals and "
+            "outlines. labels: the label map alone. how often: in how many images each "
+            "pixel is what the tab Overview says. Once a shape is there: its albedo, normals and "
             "depth, and the scene under a light of your own (keys: up and down arrow)",
         )
         for handle in (self._image, self._layer):

@@ -1,0 +1,84 @@
+"""How often: counts of the labels on screen, their colours and words."""
+
+import numpy as np
+import pytest
+
+from photolin.analysis import Options
+from photolin.factors import OUTSIDE, Factor, Thresholds
+from photolin.label import label_images
+from photolin.pipeline import analyze
+from photolin.synthetic import render_scene
+from webapp.often import CLASSES, caption_often, count_often, label_all, render_often, share_classes
+from webapp.state import OFTEN
+
+STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
+RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
+HERE, THERE = RESULT.thresholds, Thresholds(0.004, 0.2)
+
+
+@pytest.mark.parametrize("thresholds", [HERE, THERE])
+def test_labels_of_all_images_are_the_backends(thresholds: Thresholds) -> None:
+    expected = label_images(
+        STACK.images, RESULT.linearized_bases, RESULT.coefficients, STACK.mask, thresholds
+    )
+    assert np.array_equal(label_all(STACK, RESULT, thresholds), expected)
+
+
+@pytest.mark.parametrize("thresholds", [HERE, THERE])
+def test_every_image_is_lit_or_in_shadow_or_undefined(thresholds: Thresholds) -> None:
+    counts = {often: count_often(STACK, RESULT, thresholds, often) for often in OFTEN}
+    whole = counts["lit"] + counts["any shadow"] + counts["undefined"]
+    assert (whole[STACK.mask] == 8).all()
+    shadows = counts["attached shadow"] + counts["cast shadow"]
+    assert np.array_equal(shadows, counts["any shadow"])
+    assert (counts["specular"] <= counts["lit"]).all()
+    labels = label_all(STACK, RESULT, thresholds)
+    for often, count in counts.items():
+        assert np.array_equal(count, np.isin(labels, CLASSES[often]).sum(axis=0))
+        assert count.any() or thresholds == HERE, often
+
+
+def test_choices_and_classes_are_the_same_ones() -> None:
+    assert tuple(CLASSES) == OFTEN
+    assert CLASSES["lit"] == (Factor.DIFFUSE, Factor.SPECULAR)
+
+
+def test_more_often_is_lighter_and_outside_the_mask_is_black() -> None:
+    counts = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    mask = np.ones((3, 4), bool)
+    mask[0, 1] = False
+    picture = render_often(counts, mask)
+    assert picture.shape == (3, 4, 3)
+    assert picture[0, 1].tolist() == [0, 0, 0]
+    assert picture[0, 0].tolist() == [0x44, 0x01, 0x54]
+    assert picture[2, 3].tolist() == [0xFD, 0xE7, 0x25]
+    light = (picture @ [0.2126, 0.7152, 0.0722])[mask]
+    assert (np.diff(light) > 0).all()
+    none = render_often(np.zeros((3, 4), np.uint16), np.ones((3, 4), bool))
+    assert (none == [0x44, 0x01, 0x54]).all()
+
+
+def test_the_caption_says_the_range_of_the_colours() -> None:
+    counts = np.array([[0, 7], [3, 0]], np.uint16)
+    words = "specular in 0 ... 7 of 24 images, dark purple to yellow"
+    assert caption_often(counts, 24, "specular") == words
+    assert caption_often(0 * counts, 24, "cast shadow") == "cast shadow in none of 24 images"
+
+
+def test_outside_the_mask_nothing_is_counted() -> None:
+    mask = STACK.mask.copy()
+    mask[:, :5] = False
+    labels = np.where(mask, RESULT.labels, np.uint8(OUTSIDE))
+    assert all(not np.isin(labels, CLASSES[often])[:, :, :5].any() for often in OFTEN)
+
+
+def test_shares_are_of_the_mask_and_add_up() -> None:
+    mask = STACK.mask.copy()
+    mask[:9] = False
+    labels = np.where(mask, RESULT.labels, np.uint8(255))
+    shares = share_classes(labels, mask, range(100, 108))
+    assert list(shares) == list(range(100, 108))
+    for k, share in shares.items():
+        inside = labels[k - 100][mask]
+        assert share.tolist() == [(inside == f).mean() for f in sorted(Factor)]
+        assert share.sum() == pytest.approx(1)

@@ -1,0 +1,78 @@
+"""How often classes are, at each pixel and in each image; in pictures and in words. Pure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from photolin.analysis import Analysis
+from photolin.factors import Factor, Thresholds
+from photolin.label import label_images
+from photolin.overview import count_classes
+from photolin.stack import ImageStack
+
+from .landscape_plot import colour
+from .state import Often
+
+CLASSES: dict[Often, tuple[Factor, ...]] = {
+    "specular": (Factor.SPECULAR,),
+    "lit": (Factor.DIFFUSE, Factor.SPECULAR),
+    "attached shadow": (Factor.ATTACHED,),
+    "cast shadow": (Factor.CAST,),
+    "any shadow": (Factor.ATTACHED, Factor.CAST),
+    "undefined": (Factor.UNDEFINED,),
+}
+"""What each choice counts."""
+
+
+def count_often(
+    stack: ImageStack, analysis: Analysis, thresholds: Thresholds, often: Often
+) -> NDArray[np.uint16]:
+    """(H,W) in how many of the K images each pixel is so, by `thresholds`; 0 outside the mask."""
+    return count_classes(label_all(stack, analysis, thresholds), *CLASSES[often])
+
+
+def label_all(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> NDArray[np.uint8]:
+    """(K,H,W) Factor codes of all images by a result's bases and `thresholds`."""
+    if thresholds == analysis.thresholds:
+        return analysis.labels
+    return label_images(
+        stack.images, analysis.linearized_bases, analysis.coefficients, stack.mask, thresholds
+    )
+
+
+def share_classes(
+    labels: NDArray[np.uint8], mask: NDArray[np.bool_], kept: Sequence[int]
+) -> dict[int, NDArray[np.float64]]:
+    """(5,) share of each Factor code among the mask pixels, by number of the whole stack.
+
+    Args:
+        labels: (K,H,W) of the images that are left.
+        mask: (H,W)
+        kept: their numbers in the whole stack, K.
+    """
+    inside = int(mask.sum())
+    return {
+        k: np.array([np.count_nonzero(one == np.uint8(f)) for f in sorted(Factor)]) / inside
+        for k, one in zip(kept, labels, strict=True)
+    }
+
+
+def render_often(counts: NDArray[np.uint16], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Colours (H,W,3) of counts (H,W): dark purple is none, yellow the most; black outside."""
+    table = colour(np.arange(_most(counts) + 1) / _most(counts))
+    picture = table[counts]
+    picture[~mask] = 0
+    return picture
+
+
+def caption_often(counts: NDArray[np.uint16], count: int, often: Often) -> str:
+    """What the colours span, for a stack of `count` images."""
+    if not counts.any():
+        return f"{often} in none of {count} images"
+    return f"{often} in 0 ... {_most(counts)} of {count} images, dark purple to yellow"
+
+
+def _most(counts: NDArray[np.uint16]) -> int:
+    """The greatest count, at least 1."""
+    return max(int(counts.max(initial=0)), 1)
