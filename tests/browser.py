@@ -23,8 +23,10 @@ def wait_until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
         time.sleep(0.02)
 
 
-def open_canvas(page: Any, url: str) -> None:
-    """Open the tool and wait until its canvas is placed."""
+def open_canvas(page: Any, url: str, *, hint: bool = False) -> None:
+    """Open the tool and wait until its canvas is placed; without the hint of a first visit."""
+    if not hint:  # it lies on the picture
+        page.add_init_script("localStorage.setItem('photolin-hint-dismissed', 'yes')")
     page.goto(url)
     page.wait_for_function(READY)
 

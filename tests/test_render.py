@@ -6,8 +6,10 @@ import imagecodecs
 import numpy as np
 import pytest
 from PIL import Image
+from skimage.color import deltaE_ciede2000, rgb2lab
 
 from photolin.factors import OUTSIDE, PALETTE, Factor
+from webapp.patterns import MARKS, add_marks
 from webapp.render import (
     choose_gain,
     choose_scale,
@@ -103,17 +105,18 @@ def test_indices_of_the_overlay_are_the_labels():
     np.testing.assert_array_equal(np.asarray(picture), LABELS)
 
 
-def test_colours_are_the_palette_with_others_at_55_percent_and_diffuse_at_15():
+def test_colours_are_the_palette_at_55_percent_but_diffuse_at_15_and_specular_at_75():
     overlay = rgba(encode_labels(LABELS))
+    own = {Factor.DIFFUSE: 0.15, Factor.SPECULAR: 0.75}
     for factor in Factor:
-        alpha = round(255 * (0.15 if factor is Factor.DIFFUSE else 0.55))
+        alpha = round(255 * own.get(factor, 0.55))
         found = overlay[factor == LABELS]
         assert (found == (*PALETTE[factor], alpha)).all()
     assert (overlay[LABELS == OUTSIDE, 3] == 0).all()
 
 
 @pytest.mark.parametrize("opacity", [0.0, 1.0])
-def test_at_the_ends_of_the_opacity_diffuse_is_like_the_others(opacity):
+def test_at_the_ends_of_the_opacity_all_classes_are_alike(opacity):
     alpha = rgba(encode_labels(LABELS, opacity=opacity))[..., 3]
     assert (alpha[LABELS != OUTSIDE] == round(255 * opacity)).all()
     assert (alpha[LABELS == OUTSIDE] == 0).all()
@@ -136,6 +139,44 @@ def test_another_palette_changes_the_colours_alone():
     overlay = rgba(encode_labels(LABELS, palette=palette))
     assert (overlay[LABELS != OUTSIDE, :3] == (1, 2, 3)).all()
     np.testing.assert_array_equal(overlay[..., 3], rgba(encode_labels(LABELS))[..., 3])
+
+
+def test_patterns_change_marked_pixels_alone_to_black_or_white_and_stronger():
+    labels = np.arange(5, dtype=np.uint8).repeat(16)[:, None].repeat(40, axis=1)
+    plain, marked = (rgba(encode_labels(labels, patterns=p)) for p in (False, True))
+    marks = add_marks(labels) != labels
+    np.testing.assert_array_equal(marked[~marks], plain[~marks])
+    for factor, colour in MARKS.items():
+        here = marked[marks & (labels == factor)]
+        assert (here[:, :3] == colour).all()
+        assert (here[:, 3] > plain[labels == factor, 3].max()).all()
+
+
+def test_marks_follow_opacity_and_switches_of_their_class():
+    labels = np.full((16, 16), Factor.CAST, np.uint8)
+    assert not rgba(encode_labels(labels, opacity=0.0, patterns=True))[..., 3].any()
+    assert not rgba(encode_labels(labels, [Factor.ATTACHED], patterns=True))[..., 3].any()
+    assert (rgba(encode_labels(labels, opacity=1.0, patterns=True))[..., 3] == 255).all()
+
+
+def test_outlines_have_no_patterns():
+    labels = np.full((16, 16), Factor.ATTACHED, np.uint8)
+    labels[4:12, 4:12] = Factor.CAST
+    both = (encode_labels(labels, outlines=True, patterns=p) for p in (False, True))
+    assert len(set(both)) == 1
+
+
+def test_specular_and_undefined_differ_to_all_eyes_on_dark_and_on_bright_pixels():
+    # what a deuteranope and a protanope see, linear sRGB (Machado et al. 2009, severity 1)
+    deutan = [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]
+    protan = [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]]
+    overlay = rgba(encode_labels(np.array([[2, 0]], np.uint8)))[0] / 255
+    for ground in (0.0, 0.1, 0.3, 0.6):
+        mixed = overlay[:, :3] * overlay[:, 3:] + ground * (1 - overlay[:, 3:])
+        for eyes in (np.eye(3), deutan, protan):
+            linear = np.clip(mixed**2.2 @ np.transpose(eyes), 0, 1)
+            one, other = rgb2lab(linear ** (1 / 2.2))
+            assert deltaE_ciede2000(one, other) > 10
 
 
 def test_outlines_are_the_one_pixel_rim_of_each_class_but_diffuse():

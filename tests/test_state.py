@@ -20,7 +20,8 @@ def test_equal_scalars_make_equal_and_hashable_states():
 def test_every_field_changes_the_state():
     changed = {
         "image": 1, "layer": "residual", "method": "statistical", "T": 0.1, "Ts": 0.1,
-        "opacity": 0.3, "shown": frozenset(), "outlines": True, "pixel": (0, 0), "gain": 2.0,
+        "opacity": 0.3, "shown": frozenset(), "outlines": True, "patterns": True, "theme": "light",
+        "pixel": (0, 0), "gain": 2.0,
         "live": False, "encoding": "exact (PNG)", "beside": "statistical",
         "against": "truth", "divider": 0.2, "arrangement": "left", "pins": ((1, 2),),
         "relief": True, "arrows": False, "light": (0.1, 0.2), "often": "lit",

@@ -9,7 +9,7 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 
 import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -19,6 +19,8 @@ import viser
 from photolin.shape.recover import Shape
 
 from .box import Box, box_in_text
+from .hint import HINT
+from .keys import KEYS
 from .relief import MESH, Relief
 from .second import PLANES, Second
 from .state import Pixel
@@ -85,6 +87,8 @@ class Canvas:
             "others": PLANES,
             "dividerId": self.second.divider_id,
             "bandId": widget_id(self._band),
+            "keys": [(key.shown, key.does) for key in KEYS],
+            "hint": HINT,
         }
         call_javascript(client, "window.openCanvas", options)
 
@@ -156,6 +160,14 @@ class Canvas:
         """Show each image pixel as one pixel of the screen (1 / devicePixelRatio CSS pixels)."""
         call_javascript(self._client, "window.photolin.oneToOne")
 
+    def set_reach(self, slider: viser.GuiSliderHandle[float], most: float) -> None:
+        """Let numbers up to `most` be typed beside a slider that ends earlier."""
+        call_javascript(self._client, "window.photolin.setReach", widget_id(slider), most)
+
+    def set_titles(self, titles: Mapping[str, str]) -> None:
+        """Give buttons, by their names in the page, tooltips."""
+        call_javascript(self._client, "window.photolin.setTitles", list(titles.items()))
+
     def on_pick(self, callback: Callable[[Pixel], None]) -> None:
         """Call back with the pixel that was clicked; clicks beside the picture do nothing."""
 
@@ -198,8 +210,8 @@ class Canvas:
     def on_key(self, callback: Callable[[str], None]) -> None:
         """Call back with each key pressed outside text fields: KeyboardEvent.key, "ArrowLeft".
 
-        F (fit), G (1:1) and the space bar (held: no overlay) act in the page and are not reported,
-        nor are keys with Ctrl, Alt or Meta, nor arrows on a focused slider.
+        Keys that act in the page (`Key.in_page`) are not reported, nor are keys with Ctrl, Alt or
+        Meta, arrows on a focused slider, and the Escape that closes the list of keys.
         """
 
         @self._key.on_update

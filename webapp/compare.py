@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.factors import OUTSIDE, PALETTE, Factor
-
 from .difference import render_difference
 from .frame import Frame
 from .layers import hides_labels, render_layer
-from .render import alpha_of
+from .patterns import add_marks
+from .render import tabulate_colours
 from .state import TRUTH
 
 Picture = NDArray[np.uint8]
@@ -50,7 +49,7 @@ def mixture(frame: Frame, other: Frame) -> tuple[object, ...]:
     """What decides a picture of two frames, besides the first one's own picture."""
     s = frame.state
     divider = s.divider if s.arrangement == "split" else None
-    how = (s.against, s.arrangement, divider, s.shown, s.opacity, s.thresholds, s.light)
+    how = (s.against, s.arrangement, divider, s.shown, s.opacity, s.patterns, s.thresholds, s.light)
     return (*how, s.often, frame.analysis, other.analysis, frame.preview, frame.shape)
 
 
@@ -77,11 +76,9 @@ def lay_over(picture: Picture, frame: Frame, hidden: bool) -> Picture:
     if labels is None or hidden:
         return rgb
     solid = state.layer == "labels"
-    alphas, colours = np.zeros(256, np.float32), np.zeros((256, 3), np.float32)
-    for factor in state.shown:
-        alphas[factor] = 1 if solid else alpha_of(Factor(factor), state.opacity)
-        colours[factor] = PALETTE[factor]
-    alphas[OUTSIDE] = 0
+    colours, alphas = tabulate_colours(state.shown, state.opacity, solid=solid)
+    if state.patterns:
+        labels = add_marks(labels)
     a = alphas[labels][:, :, None]
     return (rgb * (1 - a) + colours[labels] * a + 0.5).astype(np.uint8)
 

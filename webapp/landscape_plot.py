@@ -24,7 +24,7 @@ Quantity = Literal[
 ]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 
-SIDE, LEFT, TOP, RIGHT, BOTTOM = 200, 54, 12, 58, 38
+SIDE, LEFT, TOP, RIGHT, BOTTOM = 200, 60, 12, 58, 38
 """Width and height of the map, and what is around it, in the units of the drawing."""
 BAR = 10
 """Width of the legend's colours."""
@@ -69,7 +69,7 @@ def plot_landscape(
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="100%" '
         'role="img" fill="currentColor" font-family="system-ui,sans-serif" font-size="11" '
-        f'style="max-width:{1.4 * width:g}px;display:block;margin:0 auto">'
+        f'style="max-width:{width / 10:.1f}rem;display:block;margin:0 auto">'
         f"<title>{escape(quantity)} over T and Ts</title>"
         f'<svg x="{LEFT}" y="{TOP}" width="{SIDE}" height="{SIDE}" style="cursor:crosshair">'
         f'<g id="{escape(element_id)}"><image href="data:image/png;base64,{png}" '

@@ -78,14 +78,19 @@ class Sheet:
     def _paint_overlay(self, frame: Frame, *, hidden: bool) -> None:
         state = frame.state
         solid = state.layer == "labels"
-        look = (state.shown, state.opacity, state.outlines, solid, hidden, frame.labels is None)
-        how = (state.image, state.thresholds, frame.analysis, frame.preview)
+        look = (state.shown, state.opacity, state.outlines, state.patterns, solid, hidden)
+        how = (state.image, state.thresholds, frame.analysis, frame.preview, frame.labels is None)
         if not is_new(self._drawn, "overlay", *how, look):
             return
         overlay = None
         if frame.labels is not None and not hidden:
             overlay = encode_labels(
-                frame.labels, state.shown, state.opacity, outlines=state.outlines, solid=solid
+                frame.labels,
+                state.shown,
+                state.opacity,
+                outlines=state.outlines,
+                solid=solid,
+                patterns=state.patterns,
             )
         self._planes.set_overlay(overlay)
 

@@ -31,6 +31,7 @@ from .views.shape import ShapeView
 from .views.shares import SharesView
 from .views.summary import SummaryView
 from .views.thresholds import ThresholdView
+from .viser_internals import button_hints
 
 
 @dataclass(frozen=True)
@@ -120,10 +121,12 @@ class Panels:
             canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             self.shape = ShapeView(gui, stack, changed, actions.recover)
+            self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
-            self.export = ExportView(gui, actions.download)
+            self.export = ExportView(gui, actions.download, self.run.add_progress)
             with gui.add_folder("Session"):
                 self.notes = NotesView(gui, changed, actions.copy)
+            self.export.explain(gui)
         with tabs.add_tab("Help", viser.Icon.HELP):
             HelpView(gui)
         both = (self.picture, self.thresholds, self.pixel)
@@ -133,6 +136,9 @@ class Panels:
             *(self.diagnosis, self.cloud, self.compare, self.shape, self.overview),
         )
         self._keys = self._bind(actions)
+        for slider, most in self.thresholds.typed:
+            canvas.set_reach(slider, most)
+        canvas.set_titles(button_hints(client))
 
     def close(self) -> None:
         """Stop what panels compute."""

@@ -106,7 +106,7 @@ def _draw(
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="100%" '
         'role="img" fill="currentColor" font-family="system-ui,sans-serif" font-size="11" '
-        f'style="max-width:{width:g}px;display:block;margin:0 auto">'
+        f'style="max-width:{width / 14.8:.1f}rem;display:block;margin:0 auto">'
         f'<text x="{LEFT}" y="14" font-weight="600">{escape(panel.title)}</text>'
         f'<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{high}">{inner}</svg>'
         f"{_frame(axes)}</svg>"

@@ -10,12 +10,17 @@ from numpy.typing import NDArray
 
 from photolin.factors import OUTSIDE, PALETTE, Factor
 
+from .patterns import MARK, MARKS, STRENGTH, add_marks
+
 RGB = tuple[int, int, int]
 ZERO = 128
 """Grey value of zero in a signed picture."""
 OPACITY = 0.55
 DIFFUSE_OPACITY = 0.15
 """Opacity of diffuse at the default: it is everywhere, and the eye should go to the rest."""
+SPECULAR_OPACITY = 0.75
+"""Of specular at the default: on dark pixels it would else look as undefined does, both being a
+brown; brighter, it is told apart by all eyes."""
 
 
 def choose_gain(images: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
@@ -85,19 +90,21 @@ def encode_labels(
     *,
     outlines: bool = False,
     solid: bool = False,
+    patterns: bool = False,
     palette: Mapping[Factor, RGB] = PALETTE,
 ) -> bytes:
     """Overlay of a label map, as an 8-bit palette PNG whose indices are the labels themselves.
 
-    Only the palette's alpha depends on `shown` and `opacity`. Run-length matching suits label
-    maps: half the bytes of zlib's level 1, as fast.
+    Marks of patterns have indices of their own. Only the palette's alpha depends on `shown` and
+    `opacity`. Run-length matching suits label maps: half the bytes of zlib's level 1, as fast.
 
     Args:
         labels: (H,W) Factor codes; OUTSIDE and every other code is transparent.
         shown: classes drawn; the others are transparent.
-        opacity: 0 to 1; diffuse is fainter, except at 0 and 1.
+        opacity: 0 to 1; diffuse is fainter and specular stronger, except at 0 and 1.
         outlines: draw the one-pixel borders of the classes, opaque, diffuse left out.
         solid: draw every shown class opaque (the label map alone).
+        patterns: mark the classes by patterns, unless outlines are drawn.
         palette: sRGB of each class.
     """
     if outlines:
@@ -106,11 +113,9 @@ def encode_labels(
         borders = find_boundaries(labels, connectivity=1)
         labels = np.where(borders, labels, np.uint8(OUTSIDE))
         shown = set(shown) - {Factor.DIFFUSE}
-    colours = np.zeros((256, 3), np.uint8)
-    alphas = np.zeros(256, np.uint8)
-    for factor in shown:
-        colours[factor] = palette[factor]
-        alphas[factor] = round(255 * (1 if outlines or solid else alpha_of(factor, opacity)))
+    elif patterns:
+        labels = add_marks(labels)
+    colours, alphas = tabulate_colours(shown, opacity, solid=solid or outlines, palette=palette)
     H, W = labels.shape
     rows = np.zeros((H, W + 1), np.uint8)
     rows[:, 1:] = labels
@@ -119,11 +124,29 @@ def encode_labels(
         (
             _chunk(b"IHDR", struct.pack(">IIBBBBB", W, H, 8, 3, 0, 0, 0)),
             _chunk(b"PLTE", colours.tobytes()),
-            _chunk(b"tRNS", alphas.tobytes()),
+            _chunk(b"tRNS", np.rint(255 * alphas).astype(np.uint8).tobytes()),
             _chunk(b"IDAT", deflate.compress(rows.data) + deflate.flush()),
             _chunk(b"IEND", b""),
         )
     )
+
+
+def tabulate_colours(
+    shown: Collection[Factor],
+    opacity: float,
+    *,
+    solid: bool = False,
+    palette: Mapping[Factor, RGB] = PALETTE,
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """(256,3) sRGB and (256,) alpha, 0 to 1, of each code and of the marks of its pattern."""
+    colours, alphas = np.zeros((256, 3), np.uint8), np.zeros(256, np.float32)
+    for factor in shown:
+        colours[factor] = palette[factor]
+        alphas[factor] = 1 if solid else alpha_of(Factor(factor), opacity)
+        if factor in MARKS:
+            colours[factor + MARK] = MARKS[factor]
+            alphas[factor + MARK] = min(1, STRENGTH * alphas[factor])
+    return colours, alphas
 
 
 def _percentile(values: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
@@ -136,10 +159,9 @@ def _percentile(values: NDArray[np.float32], mask: NDArray[np.bool_]) -> float:
 
 
 def alpha_of(factor: Factor, opacity: float) -> float:
-    """Of a class; diffuse follows a power of the opacity: 0 and 1 stay, 55 % becomes 15 %."""
-    if factor is not Factor.DIFFUSE:
-        return opacity
-    return float(opacity ** (np.log(DIFFUSE_OPACITY) / np.log(OPACITY)))
+    """Of a class; some follow a power of the opacity: 0 and 1 stay, 55 % becomes theirs."""
+    own = {Factor.DIFFUSE: DIFFUSE_OPACITY, Factor.SPECULAR: SPECULAR_OPACITY}
+    return float(opacity ** (np.log(own.get(factor, OPACITY)) / np.log(OPACITY)))
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -28,6 +28,7 @@ from .pointing import Pointing
 from .saved import Saved
 from .selections import Selections
 from .state import SURFACE, Pixel, ViewState
+from .theme import set_theme
 from .work import Desk
 
 REST = 0.3
@@ -82,9 +83,7 @@ class Session:
     def _build(self, state: ViewState) -> None:
         _, H, W = self._source.stack.shape
         client, pointing, gui = self._client, self._pointing, self._client.gui
-        gui.configure_theme(
-            control_width="large", show_logo=False, show_share_button=False, dark_mode=True
-        )
+        set_theme(gui, state.theme)
         gui.main_panel.dock_right()
         self._canvas = canvas = Canvas(client, H, W)
         self._painter = Painter(canvas)

@@ -31,6 +31,8 @@ Often = Literal["specular", "lit", "attached shadow", "cast shadow", "any shadow
 OFTEN: tuple[Often, ...] = get_args(Often)
 Encoding = Literal["quick, then exact", "exact (PNG)", "quick (JPEG)"]
 ENCODINGS: tuple[Encoding, ...] = get_args(Encoding)
+Theme = Literal["dark", "light"]
+THEMES: tuple[Theme, ...] = get_args(Theme)
 CHOICES: dict[str, tuple[str, ...]] = {
     "layer": LAYERS,
     "often": OFTEN,
@@ -39,6 +41,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "encoding": ENCODINGS,
     "against": AGAINST,
     "arrangement": ARRANGEMENTS,
+    "theme": THEMES,
 }
 """Fields of a state that are one of some words, and the words."""
 
@@ -74,6 +77,10 @@ class ViewState:
     """Classes drawn in the overlay."""
     outlines: bool = False
     """Draw the borders of the classes in place of their areas."""
+    patterns: bool = False
+    """Mark the classes by patterns too, for eyes that do not tell their colours apart."""
+    theme: Theme = "dark"
+    """What everything is shown on."""
     against: Against | None = None
     """The layer, by the method beside where one is, or the truth, that is the right picture."""
     arrangement: Arrangement = "split"

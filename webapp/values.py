@@ -85,7 +85,8 @@ def sift(frame: object, server: viser.ViserServer) -> bytes | None:
 def accepted_value(handle: Any, value: object) -> Any | None:
     """`value` as the widget `handle` could have sent it, clamped to its range; None: impossible.
 
-    Wrong types, NaN, infinities, unknown options and texts over MAX_TEXT are impossible.
+    Wrong types, NaN, infinities, unknown options, texts over MAX_TEXT and numbers above `reach` are
+    impossible.
     """
     current = handle.value
     if isinstance(current, tuple):
@@ -94,6 +95,11 @@ def accepted_value(handle: Any, value: object) -> Any | None:
         parts = [_accepted_scalar(handle, *pair) for pair in zip(current, value, strict=True)]
         return None if None in parts else tuple(parts)
     return _accepted_scalar(handle, current, value)
+
+
+def set_reach(handle: viser.GuiSliderHandle[float], most: float) -> None:
+    """Accept up to `most` from the box beside a slider that ends earlier."""
+    handle.__dict__["reach"] = most
 
 
 def clamp_number(value: object, low: float, high: float, fallback: float) -> float:
@@ -136,8 +142,9 @@ def _accepted_scalar(handle: Any, current: object, value: object) -> Any | None:
             return value if isinstance(value, bool) else None
         case int() | float():
             low, high = _range(handle)
-            number = clamp_number(value, low, high, math.nan)
-            if math.isnan(number):
+            number = clamp_number(value, low, getattr(handle, "reach", high), math.nan)
+            beyond = hasattr(handle, "reach") and number != value and number > low
+            if math.isnan(number) or beyond:
                 return None
             return round(number) if isinstance(current, int) else number
         case str() if options is not None:

@@ -79,6 +79,13 @@ def widget_id(handle: Any) -> str:
     return handle._impl.uuid
 
 
+def button_hints(client: viser.ClientHandle) -> dict[str, str]:
+    """Name and hint of each button that has one; viser's page shows those of other widgets only."""
+    handles = client.gui._gui_input_handle_from_uuid.values()
+    buttons = (handle for handle in handles if isinstance(handle, viser.GuiButtonHandle))
+    return {handle._impl.uuid: handle.hint for handle in buttons if handle.hint is not None}
+
+
 def has_command(server: viser.ViserServer, uuid: str) -> bool:
     """Whether `uuid` is an entry of a command palette."""
     owners = (server, *server.get_clients().values())

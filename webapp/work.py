@@ -224,7 +224,7 @@ class Work:
         analysis = self._settled(state)
         self._desk.progress("writing files", 0.5)
         shown = relabel(self._runs.stack, analysis, state.thresholds)
-        self._desk.send(*make(shown, state))
+        self._hand_over(*make(shown, state))
 
     def _pack(
         self, kind: str, everything: bool, shown: Analysis, state: ViewState
@@ -240,7 +240,12 @@ class Work:
 
     def _send_shape(self) -> None:
         self._desk.progress("writing files", 0.5)
-        self._desk.send(*make_shape_download(self._recovered))
+        self._hand_over(*make_shape_download(self._recovered))
+
+    def _hand_over(self, name: str, data: bytes) -> None:
+        if self._job.stopping():
+            raise Cancelled("export cancelled; nothing was saved")
+        self._desk.send(name, data)
 
 
 @contextmanager

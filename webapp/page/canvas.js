@@ -48,9 +48,10 @@ window.openCanvas = (options) => {
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
+  const widgets = openWidgets(page);
   const compare = openCompare({ ...page, camera });
   const band = openBand({ ...page, camera });
-  openInput({ ...page, camera, band });
+  openInput({ ...page, camera, band, cards: openCards(page) });
 
   // --- before each frame ---
 
@@ -103,9 +104,27 @@ window.openCanvas = (options) => {
 
   // --- settings of the page ---
 
-  // The panel's scroll bar lies over the right end of its boxes and buttons.
+  // The panel's scroll bar lies over the right end of its boxes and buttons. Boxes of sliders have no
+  // room for four decimals. Tooltips lie over the row above, which may be the next one to click, and
+  // take its clicks: where the picture is wide enough, they go beside the panel instead. In a window
+  // of 4K without scaling, viser's letters are tiny. Tabs take two rows, not three: what is used
+  // together is then seen together in a window of 1280 x 720.
   const style = document.head.appendChild(document.createElement("style"));
-  style.textContent = ".mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}";
+  style.textContent = `
+    .mantine-ScrollArea-content .mantine-ScrollArea-content{padding-right:6px}
+    .mantine-Slider-root + .mantine-NumberInput-root{width:3.9rem!important}
+    [role=tab][data-dock-tab]{padding:0 .5em!important}
+    .mantine-Tooltip-tooltip{pointer-events:none;font-size:.85rem}
+    .photolin-quiet .mantine-Tooltip-tooltip{visibility:hidden}
+    @media (min-width:3000px) { html{font-size:17px!important} }
+    @media (min-width:640px) {
+      .mantine-Tooltip-tooltip[data-multiline]{
+        left:calc(var(--photolin-canvas-width) - 15rem - 10px)!important}
+      .mantine-Tooltip-tooltip[data-multiline] .mantine-Tooltip-arrow{display:none}
+    }`;
+  const measure = new ResizeObserver(() =>
+    document.documentElement.style.setProperty("--photolin-canvas-width", `${canvas.clientWidth}px`));
+  measure.observe(canvas);
 
   // viser lowers the resolution on slow machines, which blurs pixels.
   const fixResolution = () =>
@@ -138,6 +157,7 @@ window.openCanvas = (options) => {
     closing.abort();
     band.setSampling(null);
     clearTimeout(viewTimer);
+    measure.disconnect();
     layer.remove();
     style.remove();
     scene.onBeforeRender = () => {};
@@ -152,6 +172,8 @@ window.openCanvas = (options) => {
     setLight: light.setLight,
     setComparison: compare.set,
     setReadout: marks.setReadout,
+    setReach: widgets.setReach,
+    setTitles: widgets.setTitles,
     setSampling: band.setSampling,
     setBoxes: band.setBoxes,
     copy: (text) => navigator.clipboard?.writeText(text),

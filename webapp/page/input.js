@@ -1,6 +1,8 @@
 // Pointer and keys: which pixel is meant, and who gets a key, the picture or a widget.
 
-function openInput({ viewer, listen, rows, columns, camera, band, hoverId, pickId, keyId, send, sender, peek, CLICK_PIXELS }) {
+function openInput({
+  viewer, listen, rows, columns, camera, band, cards, hoverId, pickId, keyId, send, sender, peek, CLICK_PIXELS,
+}) {
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
   const { canvas } = viewer;
@@ -61,10 +63,14 @@ function openInput({ viewer, listen, rows, columns, camera, band, hoverId, pickI
     if (focused && !isBusy(focused)) focused.blur(); // Tab still goes on from there
   }
 
-  const local = { f: camera.fit, g: camera.oneToOne, " ": () => peek(true) };
+  const local = {
+    f: camera.fit, g: camera.oneToOne, " ": () => peek(true),
+    h: cards.toggleHint, "?": cards.toggleKeys,
+  };
 
   function onKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
+    if (event.key === "Escape" && cards.closeKeys()) return;
     const action = local[event.key.toLowerCase()];
     const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
     if (!action && !reported) return;

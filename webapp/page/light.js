@@ -10,7 +10,7 @@ function openLight({ layer, listen, lightId, sender }) {
   ball.title = "Drag: where the light comes from. Middle: from the camera; rim: from the side";
   ball.style.cssText =
     `width:${BALL}px;height:${BALL}px;box-sizing:border-box;border-radius:50%;` +
-    "position:absolute;right:14px;bottom:44px;" + // above the line of text
+    "position:absolute;z-index:2;right:14px;bottom:44px;" + // above the line of text
     "pointer-events:auto;cursor:grab;touch-action:none;border:1px solid #fff8;" +
     "box-shadow:0 0 0 1px #0008";
   ball.hidden = true;

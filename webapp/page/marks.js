@@ -21,8 +21,8 @@ function openMarks({ viewer, layer, rows, columns, camera, relief }) {
   const readout = layer.appendChild(document.createElement("div"));
   readout.className = "photolin-readout";
   readout.style.cssText =
-    "position:absolute;left:0;bottom:0;padding:.3em .8em;border-radius:0 6px 0 0;white-space:pre-wrap;" +
-    "font:13px ui-monospace,monospace;color:#fff;background:rgba(0,0,0,.72)";
+    "position:absolute;z-index:2;left:0;bottom:0;padding:.3em .8em;border-radius:0 6px 0 0;white-space:pre-wrap;" +
+    "font:.88rem ui-monospace,monospace;color:#fff;background:rgba(0,0,0,.72)";
   readout.hidden = true;
 
   const marks = []; // {elements, row, column, height, ring}

@@ -49,13 +49,18 @@ THIS, ALL = "this image", "all images"
 class ExportView:
     """Choice of files and a download button."""
 
-    def __init__(self, gui: viser.GuiApi, export: Callable[[str, bool], None]) -> None:
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        export: Callable[[str, bool], None],
+        add_progress: Callable[[viser.GuiApi], None],
+    ) -> None:
         self._kind = gui.add_dropdown("Files", tuple(KINDS), hint="What to save, see below")
         self._images = gui.add_dropdown(
             "Of", (THIS, ALL), hint="Result, report, shape and figures decide by themselves"
         )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
-        gui.add_markdown(TEXT)
+        add_progress(gui)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
@@ -64,6 +69,10 @@ class ExportView:
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:
             export(*self.chosen())
+
+    def explain(self, gui: viser.GuiApi) -> None:
+        """Say what the files hold; long, and so below all else of the tab."""
+        gui.add_markdown(TEXT)
 
     def chosen(self) -> tuple[str, bool]:
         """The kind of files, and whether of all images."""

@@ -2,6 +2,8 @@
 
 import viser
 
+from ..keys import tabulate_keys
+
 TEXT = """
 Every pixel of every image is labelled **D** diffuse, **S** specular, **A** attached shadow
 (the surface faces away from the light), **C** cast shadow (something blocks the light) or **U**
@@ -29,27 +31,7 @@ The tab *Compare* sets another layer, another method or the true labels beside w
 at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
 turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
 
-| key | does |
-|---|---|
-| ← → | previous, next image |
-| ↑ ↓ | view: input, linearized, residual, labels, how often, and those of a shape |
-| [ ] | T down, up |
-| { } | Ts down, up |
-| S | suggest T and Ts |
-| R | linearize again with T and Ts |
-| Z, Shift-Z | undo, redo a change of T or Ts |
-| M | next method |
-| K, Shift-K | leave this image out, take all images in again |
-| P | pin the selected pixel to compare with |
-| X, U | next image where it is specular, undefined |
-| B, Shift-B | compare: one picture alone and the other in turn, both again |
-| 1 … 5 | show or hide D, S, A, C, U |
-| space held | without overlay |
-| N | recover the shape, as the tab Shape says |
-| D | 3D, flat again |
-| F, G | fit, one image pixel on one screen pixel |
-| E | export as chosen |
-| Esc | cancel what is running, stop sampling |
+{keys}
 
 Left-drag moves the picture, the wheel zooms at the pointer, a double click fits. While samples are
 taken a left-drag draws a rectangle, and Shift-drag or right-drag moves. In 3D left-drag
@@ -57,7 +39,7 @@ turns, right-drag moves, the wheel zooms, a click selects the pixel, F and a dou
 the front again.
 Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in
 space x is right, y up, z to the camera.
-"""
+""".replace("{keys}", tabulate_keys())
 
 
 class HelpView:

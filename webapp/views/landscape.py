@@ -81,7 +81,9 @@ class LandscapeView:
         )
         self._picture = gui.add_html("")
         self._bar = gui.add_progress_bar(0, visible=False, animated=True)
-        self._cancel = gui.add_button("Cancel", visible=False, icon=viser.Icon.X)
+        self._cancel = gui.add_button(
+            "Cancel", visible=False, icon=viser.Icon.X, hint="Stop making the map"
+        )
         self._map_id = clicks.watch("landscape", self._click, lambda shown: None)
         self._view_id = clicks.see("landscape-view", self._see)
         self._show()

@@ -39,7 +39,12 @@ class PictureView:
             marks=(),  # their numbers would lie under the handle
             hint="Image number, from 0 (keys: left and right arrow)",
         )
-        self._buttons = gui.add_button_group(" ", (PREVIOUS, NEXT, FIT, ONE_TO_ONE))
+        self._buttons = gui.add_button_group(
+            " ",
+            (PREVIOUS, NEXT, FIT, ONE_TO_ONE),
+            hint="previous, next: image, round the ends. fit: the whole picture (key: F). 1:1: one "
+            "image pixel on one pixel of the screen (key: G)",
+        )
         self._layer = gui.add_dropdown(
             "View",
             tuple(layer for layer in LAYERS if layer not in SURFACE),

@@ -1,14 +1,32 @@
 """How much of the image shown each class takes."""
 
+import base64
+import functools
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from photolin.factors import PALETTE
+from photolin.factors import Factor
 
 from ..frame import Frame
 from ..readout import escape, legend
+from ..render import encode_labels
 from . import INDENT
+
+SIDE = 12
+"""Of a swatch, pixels."""
+
+
+@functools.cache
+def swatch(factor: Factor, patterns: bool) -> str:
+    """HTML of a small square in the colour of a class, with its pattern as the overlay draws it."""
+    labels = np.full((SIDE, SIDE), factor, np.uint8)
+    png = base64.b64encode(encode_labels(labels, solid=True, patterns=patterns)).decode("ascii")
+    return (
+        f'<img src="data:image/png;base64,{png}" width="{SIDE}" height="{SIDE}" alt="" '
+        'style="border-radius:2px;vertical-align:-0.1em;image-rendering:pixelated">'
+    )
 
 
 class SharesView:
@@ -28,15 +46,15 @@ class SharesView:
             if analysis is not None and labels is not None
         ]
         self._strip.content = "".join(
-            _strip(labels, method if len(rows) > 1 else "") for method, labels in rows
+            _strip(labels, method if len(rows) > 1 else "", frame.state.patterns)
+            for method, labels in rows
         )
 
 
-def _strip(labels: NDArray[np.uint8], method: str) -> str:
+def _strip(labels: NDArray[np.uint8], method: str, patterns: bool) -> str:
     cells = [
         f'<span style="white-space:nowrap" title="{row.title}: {row.count} pixels">'
-        f'<span style="display:inline-block;width:0.7em;height:0.7em;border-radius:2px;'
-        f'background:rgb{PALETTE[row.factor]}"></span> {row.letter} {row.percent:.1f} %</span>'
+        f"{swatch(row.factor, patterns)} {row.letter} {row.percent:.1f} %</span>"
         for row in legend(labels)
     ]
     name = f'<span style="width:100%">{escape(method)}</span>' if method else ""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import nextafter
 
 import viser
 
@@ -11,11 +12,16 @@ from ..frame import Frame
 from ..history import History
 from ..readout import escape, preview_status, threshold_status
 from ..state import ViewState
-from ..values import clamp_number
+from ..values import clamp_number, set_reach
 from . import ATTENTION
 
 STEP = 0.0005
 RANGES = {"T": (0.0005, 0.2), "Ts": (0.0, 0.2)}
+"""Where the sliders end, unless they are to stand beyond."""
+MOST = {"T": 1.0, "Ts": nextafter(1, 0)}
+"""What may be typed."""
+DECIMALS = 6
+"""Of what is typed and shown in the boxes."""
 KEY_FACTOR = 1.1
 SUGGEST, LINEARIZE = "suggest T, Ts", "linearize again"
 UNDO, REDO, RESET = "undo", "redo", "reset"
@@ -38,8 +44,8 @@ class ThresholdView:
             STEP,
             RANGES["T"][0],
             marks=(),
-            hint="Relative tolerance: an observation i counts as diffuse while |i - l| is at most "
-            "T times i (keys: [ and ])",
+            hint="Relative tolerance, a share of i without unit: an observation i counts as "
+            "diffuse while |i - l| is at most T times i. Up to 1 can be typed (keys: [ and ])",
         )
         self._Ts = gui.add_slider(
             "Ts",
@@ -47,8 +53,8 @@ class ThresholdView:
             STEP,
             RANGES["Ts"][0],
             marks=(),
-            hint="Shadow level, fraction of full scale: darker observations are shadow "
-            "(keys: { and })",
+            hint="Shadow level, fraction of full scale: darker observations are shadow. Up to just "
+            "below 1 can be typed (keys: { and })",
         )
         self._live = gui.add_checkbox(
             "live",
@@ -65,10 +71,14 @@ class ThresholdView:
             "the labels follow the sliders (key: R)",
         )
         self.begin(initial)
+        for handle, most in self.typed:
+            handle.precision = DECIMALS
+            set_reach(handle, most)
         for handle in (self._T, self._Ts, self._live):
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
+                self._reach()
                 changed()
 
         actions = {SUGGEST: suggest, LINEARIZE: linearize}
@@ -76,6 +86,11 @@ class ThresholdView:
         @self._buttons.on_click
         async def _(_: viser.GuiEvent) -> None:
             actions[self._buttons.value]()
+
+    @property
+    def typed(self) -> tuple[tuple[viser.GuiSliderHandle[float], float], ...]:
+        """The sliders beside whose boxes more can be typed, each with how much."""
+        return ((self._T, MOST["T"]), (self._Ts, MOST["Ts"]))
 
     def add_steps(self, gui: viser.GuiApi) -> None:
         """Add the buttons that undo, redo and reset; where there is room for them."""
@@ -126,11 +141,17 @@ class ThresholdView:
             self.set(history.now)
 
     def set(self, thresholds: Thresholds) -> None:
-        """Move both sliders, and widen them when they do not reach."""
+        """Move both sliders, which end where they did at first or, if need be, there."""
         self._fallback = thresholds
-        for handle, value in ((self._T, thresholds.T), (self._Ts, thresholds.Ts)):
-            handle.min, handle.max = min(handle.min, value), max(handle.max, value)
+        for handle, name in ((self._T, "T"), (self._Ts, "Ts")):
+            value, (low, high) = getattr(thresholds, name), RANGES[name]
+            handle.min, handle.max = min(low, value), max(high, value)
             handle.value = value
+
+    def _reach(self) -> None:
+        """Widen the sliders to what was typed."""
+        for handle in (self._T, self._Ts):
+            handle.max = max(handle.max, handle.value)
 
     def set_T(self, T: float) -> None:
         """Move the slider T."""

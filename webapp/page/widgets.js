@@ -1,0 +1,47 @@
+// What viser's widgets leave out: typing beyond the ends of a slider, tooltips of buttons, and
+// tooltips that go once a widget is used, as one looks at the picture then.
+
+function openWidgets({ listen }) {
+  const reaches = new Map(); // id of a slider -> the most that may be typed into its box
+  const titles = new Map(); // id of a button -> its tooltip
+
+  /** A box left takes its number back to the end of the slider. The server moves that end for a
+   * number that it accepts, but its answer may come later: then the box is not told. */
+  function isBeforeAnswer({ target }) {
+    const row = target.closest?.(".mantine-NumberInput-root")?.parentElement;
+    const slider = row?.querySelector(".mantine-Slider-root");
+    const end = Number(slider?.querySelector("[role=slider]")?.getAttribute("aria-valuemax"));
+    const typed = Number(target.value);
+    return typed > end && typed <= reaches.get(slider?.id);
+  }
+
+  listen(window, "focusout", (event) => isBeforeAnswer(event) && event.stopPropagation(), true);
+  // tabs make their buttons anew when they are opened
+  listen(window, "pointerover", ({ target }) => {
+    const button = target.closest?.("button[id]");
+    const title = titles.get(button?.id);
+    if (title) button.title = title;
+  });
+
+  const ROW = 24; // CSS pixels: the pointer is on another widget
+  const quiet = document.documentElement.classList;
+  let usedAt = null; // height of the pointer when a widget was used last
+
+  function use(event) {
+    usedAt = event.clientY ?? usedAt ?? 0;
+    quiet.add("photolin-quiet");
+  }
+
+  listen(window, "pointerdown", use, true);
+  listen(window, "keydown", use, true);
+  listen(window, "pointermove", ({ clientY, buttons }) => {
+    if (usedAt === null || buttons || Math.abs(clientY - usedAt) < ROW) return;
+    usedAt = null;
+    quiet.remove("photolin-quiet");
+  }, true);
+
+  return {
+    setReach: (id, most) => reaches.set(id, most),
+    setTitles: (pairs) => pairs.forEach(([id, title]) => titles.set(id, title)),
+  };
+}
