@@ -163,7 +163,7 @@ def describe_shape(shape: Shape) -> str:
     """How the ambiguity of unknown lights was resolved, and what is left open."""
     found = shape.resolved
     unknown = int(np.count_nonzero(np.isnan(shape.albedo)))
-    sentences = [f"Normals {found.note}."]
+    sentences = [f"Normals {found.note}.", *(f"Warning: {doubt}." for doubt in found.doubts)]
     if unknown:
         sentences.append(f"{unknown} pixels have too few observations for a normal.")
     if shape.depth is not None:
