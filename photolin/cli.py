@@ -80,7 +80,7 @@ def run(
         stack_path=stack,
         load_options=reading,
     )
-    print(run_summary(result))
+    print(run_summary(result, () if normals is None else normals.resolved.doubts))
     print(f"written {out / 'result.npz'} and {out / 'report.json'}")
 
 

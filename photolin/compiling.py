@@ -11,7 +11,7 @@ from numba.core import event
 
 from .analysis import Progress
 
-COMPILING = "compiling, kept for later runs (half a minute in all)"
+COMPILING = "compiling a loop at its first use, kept for later runs (half a minute for all)"
 """The stage that is told meanwhile."""
 EXPECTED = 30.0
 """Seconds it may take; they make the fraction."""

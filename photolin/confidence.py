@@ -152,7 +152,8 @@ def doubt_model(stack: ImageStack, confidence: Confidence) -> list[str]:
     cause = (
         "the surface may be too glossy"
         if stack.lights is None
-        else "the lights given may not belong to these images, or not in this order"
+        else "the lights given may not belong to these images, not be in their order, or have "
+        "other powers"
     )
     return [
         f"only {100 * diffuse / lit:.0f} % of the lit observations agree with the result within "

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 
+import numpy as np
 import tyro
 from tqdm import tqdm
 
@@ -17,6 +18,7 @@ from .compiling import COMPILING, tell_compiling
 from .errors import OptionError, PhotolinError
 from .factors import OUTSIDE, TITLES
 from .kinds import KINDS
+from .shape.resolved import Resolved
 from .stack import ImageStack
 
 Call = Callable[[], None]
@@ -144,8 +146,8 @@ def thresholds(result: Analysis) -> str:
     return f"T {result.thresholds.T:.4g}, Ts {result.thresholds.Ts:.4g}"
 
 
-def run_summary(result: Analysis) -> str:
-    """What a run decided and found, for people."""
+def run_summary(result: Analysis, doubts: Sequence[str] = ()) -> str:
+    """What a run decided and found, for people; `doubts` are those of its normals."""
     inside = result.labels[result.labels != OUTSIDE]
     shares = ", ".join(f"{title} {(inside == f).mean():.1%}" for f, title in TITLES.items())
     bases = ", ".join(f"{k} ({result.names[k]})" for k in result.base_images)
@@ -157,9 +159,23 @@ def run_summary(result: Analysis) -> str:
             f"base images: {bases}",
             f"labels: {shares}",
             *remarks(result),
+            *(f"warning: {text}" for text in doubts),
             f"seconds: {result.seconds['total']:.2f} (reading {result.seconds['load']:.2f})",
         ]
     )
+
+
+def shape_summary(result: Analysis, resolved: Resolved) -> str:
+    """What was read, how the shape was found, and what is wrong with it, a line each."""
+    lines = [*result.notes, f"{result.title}: {resolved.note}"]
+    if resolved.residual:
+        lines.append(f"residual: {resolved.residual:.3g}, {resolved.residual_means}")
+    undetermined = np.count_nonzero(result.mask & ~result.determined())
+    if undetermined:
+        pixels = np.count_nonzero(result.mask)
+        lines.append(f"undetermined: {undetermined} of {pixels} pixels have no normal")
+    doubts = (*result.warnings, *resolved.doubts)
+    return "\n".join([*lines, *(f"warning: {text}" for text in doubts)])
 
 
 def stack_summary(stack: ImageStack) -> str:
@@ -179,15 +195,28 @@ def stack_summary(stack: ImageStack) -> str:
     )
 
 
-MEASURES = """\
-macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect
+MEASURES = {
+    "macro": """\
+macro: mean over the true classes of the percentage that was labelled rightly; 100 is perfect""",
+    "p99": """\
 rms: root mean square of linearized minus ideal image, fraction of full scale
-p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale
-light error: mean angle between true and estimated lights, up to one linear map for all, degrees
-normals: angle between true and found normals, degrees; pixels without one are counted apart
-depth: root mean square and largest error, mm, less the mean error of each connected part
-lights as found: mean angle between true lights and those of the shape, without any map, degrees"""
-"""What the numbers of an evaluation mean, a line each."""
+p99: 99 of 100 pixels differ from the ideal image by less than this, fraction of full scale""",
+    "light error": """\
+light error: mean angle between true and estimated lights, up to one linear map for all, degrees""",
+    r"normals( \(|  )": """\
+normals: angle between true and found normals, degrees; pixels without one are counted apart""",
+    r"depth( \(|  )": """\
+depth: errors in mm, less the mean error of each part (for the median, less its median error); parts
+    are bounded by outlines and by jumps of the true depth""",
+    "lights as found": """\
+lights as found: mean angle between true lights and those of the shape, without any map, degrees""",
+}
+"""What the numbers of an evaluation mean, by what names them in it."""
+
+
+def explain_measures(text: str) -> str:
+    """The lines of MEASURES for what an evaluation holds."""
+    return "\n".join(line for name, line in MEASURES.items() if re.search(name, text))
 
 
 def remarks(of: ImageStack | Analysis) -> list[str]:

@@ -164,7 +164,7 @@ def format_evaluation(evaluation: Evaluation, title: str = "result") -> str:
             f"{'true':<6}{'count':>12}{'share':>9}{heads}",
             *rows,
             f"macro accuracy      {e.macro:.2f} %",
-            f"linearized - ideal  rms {e.rms:.6f}, 99 % below {e.p99:.6f} of full scale, "
+            f"linearized - ideal  rms {e.rms:.6f}, p99 {e.p99:.6f} of full scale, "
             f"worst in image {e.worst_image}; {e.undetermined} pixels undetermined",
             f"light error         {e.light_error:.3f} degrees",
             *([] if np.isnan(e.oracle_ratio) else [f"oracle ratio        {e.oracle_ratio:.3f}"]),

@@ -8,21 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from .analysis import Analysis, Cancel, Options, Progress
+from .analysis import Analysis, Cancel, Confidence, Options, Progress
 from .blocks import Talk
 from .coefficients import estimate_coefficients, relate_to_bases
 from .confidence import doubt_dimensions, doubt_distance, find_doubts, measure_confidence
 from .dimensions import fit_plane
-from .errors import OptionError
+from .errors import DegenerateError, OptionError
 from .factorize import Factorization
 from .factors import Thresholds
 from .label import label_images
+from .light_powers import doubt_powers, is_uneven
 from .linearize import Quality, linearize
 from .near_light import compare_regions
 from .sample import Sample, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
-from .thresholds import Suggestion, suggest_from_sample
+from .thresholds import Suggestion, linearize_sample, suggest_from_sample
 
 DOUBTED_PIXELS = 2000
 """Sampled pixels that tell whether the stack is one of three dimensions and distant lights."""
@@ -87,6 +88,7 @@ def run_stages(stack: ImageStack, options: Options, talk: Talk) -> Analysis:
             *doubt_blackness(suggestion),
             *find_doubts(stack, confidence, thresholds),
             *doubt_lights(stack, sample, found, options, thresholds),
+            *doubt_strength(stack, sample, confidence, suggestion, options, talk.cancel),
         )
     return Analysis(
         options=options,
@@ -159,6 +161,25 @@ def doubt_lights(
     regions = compare_regions(few, rows, columns, known, thresholds)
     # where one dimension is noise, it differs between parts of the picture too
     return doubt_dimensions(plane) or doubt_distance(regions)
+
+
+def doubt_strength(
+    stack: ImageStack,
+    sample: Sample,
+    confidence: Confidence,
+    suggestion: Suggestion,
+    options: Options,
+    cancel: Cancel | None,
+) -> list[str]:
+    """Whether known lights have other powers; finding those takes as long as unknown lights do."""
+    if stack.lights is None or not is_uneven(confidence.gain):
+        return []
+    Ts, starts = suggestion.thresholds.Ts, list(suggestion.starts)
+    try:
+        free = linearize_sample(sample, starts, Ts, options, None, cancel)
+    except DegenerateError:
+        return []
+    return doubt_powers(stack.lights, stack.names, free.coefficients)
 
 
 def describe_choices(options: Options, suggestion: Suggestion) -> list[str]:

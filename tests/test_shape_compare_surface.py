@@ -1,5 +1,6 @@
 """Errors of a surface: laws, hand-made errors, what is left out, refusals."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -109,7 +110,8 @@ def test_every_figure_is_told_with_its_unit() -> None:
     errors = compare_surface(turned(1.0), TRUE, depth=own_depth(), lights=TRUE.lights)
     normals, depth, lights = describe_errors(errors)
     assert "degrees" in normals
-    assert "rms 0.0000 mm, largest 0.0000 mm over" in depth
+    assert "rms 0.0000, median 0.0000, largest 0.0000 mm over" in depth
+    assert re.search(r" pixels in \d+ parts$", depth)
     assert lights == "lights as found     0.000 degrees"
 
 

@@ -113,7 +113,7 @@ def test_lights_with_z_away_from_the_camera_are_doubted() -> None:
     stack, analysis, _ = known()
     turned = replace(analysis, lights=-np.array(analysis.lights))
     found = recover_shape(stack, turned, resolve_ambiguity(turned), depth=False)
-    assert "100 % of the normals face away from the camera" in found.resolved.note
+    assert "100 % of the normals face away from the camera" in found.resolved.doubts[-1]
     assert "away" not in shape().resolved.note
 
 

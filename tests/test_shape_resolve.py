@@ -11,7 +11,7 @@ from photolin.analysis import Analysis
 from photolin.errors import DegenerateError, InputError
 from photolin.shape.directions import angles_between
 from photolin.shape.known import Known
-from photolin.shape.resolve import resolve_ambiguity
+from photolin.shape.resolve import check_lights_found, resolve_ambiguity
 from photolin.shape.resolved import Resolved
 from photolin.synthetic import Scene, render_scene
 
@@ -170,3 +170,10 @@ def test_a_sphere_of_no_size_is_refused(radius: float) -> None:
     for points in ((), PIXELS):
         with pytest.raises(InputError, match="a radius above 0 pixels"):
             resolve_ambiguity(analysis(), Known((59.5, 79.5, radius), points))
+
+
+def test_points_that_are_not_true_of_the_scene_are_said_not_to_fit() -> None:
+    """Their normals put all lights into one plane: not the lights are wrong, the points are."""
+    with pytest.raises(DegenerateError, match="what is known of the scene does not fit the images"):
+        check_lights_found(np.random.default_rng(0).normal(size=(9, 3)) * (1, 1e-4, 1))
+    check_lights_found(true_lights())

@@ -23,7 +23,7 @@ FLOORS = (
     ("linearize", "follow", "residuals"),
     ("near_light", "dimensions", "confidence"),
     ("landscape", "overview", "candidates"),
-    ("shape", "oracle", "evaluate", "paper"),
+    ("shape", "oracle", "evaluate", "paper", "light_powers"),
     ("pipeline",),
     ("export",),
     ("panels",),

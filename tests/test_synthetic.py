@@ -296,6 +296,21 @@ def test_a_written_scene_reads_back_equal(small: Scene, tmp_path: Path) -> None:
     assert "6 images of 24 x 32 pixels" in (tmp_path / "cup" / "README.txt").read_text()
 
 
+def test_lights_are_written_when_asked_for_and_read_back_with_their_powers(
+    small: Scene, tmp_path: Path
+) -> None:
+    from photolin.load import load_stack
+
+    write_scene(small, tmp_path / "with", lights=True)
+    write_scene(small, tmp_path / "without")
+    found = load_stack(tmp_path / "with").lights
+    assert found is not None
+    truth = small.truth
+    np.testing.assert_allclose(found, truth.lights * truth.power[:, None], atol=1e-6)
+    assert (tmp_path / "with" / "lights.txt").read_text().startswith("000.png ")
+    assert load_stack(tmp_path / "without").lights is None
+
+
 def test_an_8_bit_scene_is_written_with_8_bits(tmp_path: Path) -> None:
     from imagecodecs import png_decode
 

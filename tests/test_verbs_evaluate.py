@@ -10,7 +10,7 @@ from command_line import complaint
 from scipy.io import savemat
 
 from photolin.cli import main
-from photolin.console import MEASURES
+from photolin.console import explain_measures
 from photolin.synthetic import load_truth
 
 FIGURES = ("normals", "depth", "lights as found")
@@ -59,8 +59,9 @@ def say(arguments: list[str | Path], capsys: pytest.CaptureFixture[str]) -> str:
     capsys.readouterr()
     assert main([str(a) for a in arguments]) == 0
     said = capsys.readouterr().out
-    assert said.endswith(MEASURES + "\n")
-    return said.removesuffix(MEASURES + "\n")
+    measured, _, legend = said.partition(explain_measures(said))
+    assert legend == "\n"
+    return measured
 
 
 def figures(said: str) -> set[str]:
@@ -78,12 +79,17 @@ def test_a_result_is_measured_by_what_it_has(stack: Path, results: dict[str, Pat
     )
     assert mean is not None
     assert float(mean[1]) < 0.5
-    assert re.search(r"depth +rms [\d.]+ mm, largest [\d.]+ mm over \d+ pixels", said)
+    assert re.search(
+        r"depth +rms [\d.]+, median [\d.]+, largest [\d.]+ mm over \d+ pixels in \d+ parts", said
+    )
     assert "lights as found     0.000 degrees" in said
 
 
 def test_every_figure_is_explained() -> None:
-    assert {line.split(":")[0] for line in MEASURES.splitlines()} >= {*FIGURES, "light error"}
+    whole = "macro p99 light error\nnormals  1\ndepth  1\nlights as found  1"
+    explained = [line.split(":")[0] for line in explain_measures(whole).splitlines()]
+    assert {*explained} >= {"macro", "rms", "p99", "light error", *FIGURES}
+    assert explain_measures("no normals: depth") == ""
 
 
 @pytest.mark.parametrize("lights", [False, True])
@@ -140,7 +146,10 @@ def test_truths_that_do_not_fit_are_refused(
     results: dict[str, Path], benchmark_folder: Path, tmp_path: Path, capsys
 ) -> None:
     shape = results["shape"]
-    assert "name its ground truth" in complaint(["evaluate", shape], capsys)
+    line = complaint(["evaluate", shape], capsys)
+    assert (
+        "name its ground truth after it: gt.npz, the folder that holds it, or a folder of" in line
+    )
     assert "not found; a gt.npz" in complaint(["evaluate", shape, tmp_path], capsys)
     savemat(benchmark_folder / "Normal_gt.mat", {"Normal_gt": np.ones((4, 5, 3))})
     line = complaint(["evaluate", shape, benchmark_folder], capsys)

@@ -210,6 +210,62 @@ def test_lights_of_the_stack_are_used_and_no_fit_is_claimed(lit: Path, tmp_path,
     assert load_result(tmp_path).lights is not None
 
 
+def test_unknown_powers_are_found_and_no_result_is_taken_for_a_stack(
+    stack: Path, tmp_path: Path, capsys
+) -> None:
+    folder = tmp_path / "stack"
+    shutil.copytree(stack, folder)
+    truth = load_truth(stack)
+    np.savetxt(folder / "lights.txt", truth.lights)  # of length 1, powers differ by a fifth
+    run(["shape", folder, tmp_path / "given"])
+    said = capsys.readouterr().out
+    assert "warning: the light powers given, which are all equal, are not those of" in said
+    assert "\nlights: lights.txt\n" in said
+    out = tmp_path / "found"
+    run(["shape", folder, out, "--powers", "unknown"])
+    said = capsys.readouterr().out
+    assert "powers: found from the images" in said
+    assert "are not those" not in said
+    assert error(out, stack) < 0.05
+    assert error(tmp_path / "given", stack) > 0.5
+    shape = load_shape(out)
+    assert shape is not None
+    ratio = np.linalg.norm(shape.lights, axis=1) / truth.power
+    np.testing.assert_allclose(ratio, ratio.mean(), rtol=1e-3)
+    assert json.loads((out / "report.json").read_text())["load"]["lights"] == "none"
+    line = complaint(["shape", out, tmp_path / "b", "--powers", "unknown"], capsys)
+    assert "is a result, linearized with what was known of its lights" in line
+    line = complaint(["shape", stack, tmp_path / "b", "--powers", "unknown"], capsys)
+    assert "has no lights; with powers unknown, a stack with light directions" in line
+    both = ["--powers", "unknown", *sphere(stack)]
+    assert "powers unknown takes" in complaint(["shape", folder, tmp_path / "b", *both], capsys)
+
+
+def test_lights_with_y_down_are_warned_of_by_shape_and_run_and_kept(
+    stack: Path, tmp_path: Path, capsys
+) -> None:
+    truth, down = load_truth(stack), tmp_path / "down.txt"
+    np.savetxt(down, truth.lights * truth.power[:, None] * (1, -1, 1))
+    warned = "warning: the normals belong to no surface as they are"
+    for verb in ("shape", "run"):
+        run([verb, stack, tmp_path / verb, "--lights", down])
+        said = capsys.readouterr().out
+        assert warned in said
+        assert "with y turned round they do" in said
+    shape = load_shape(tmp_path / "shape")
+    assert shape is not None
+    assert "y turned round" in shape.resolved.doubts[0]
+
+
+def test_a_sphere_that_is_none_is_doubted_or_refused(
+    stack: Path, result: Path, tmp_path: Path, capsys
+) -> None:
+    run(["shape", result, tmp_path / "a", *sphere(stack)])
+    assert "of the sphere's pixels are off" not in capsys.readouterr().out
+    run(["shape", result, tmp_path / "a", "--sphere", "5", "5", "150"])
+    assert re.search(r"warning: \d+ % of the sphere's pixels are off by", capsys.readouterr().out)
+
+
 def test_points_win_over_lights_of_the_stack(lit: Path, points: Path, tmp_path, capsys) -> None:
     run(["shape", lit, tmp_path, "--points", points])
     said = capsys.readouterr().out
@@ -426,6 +482,10 @@ def test_a_mirror_ball_gives_its_lights_as_files(balls: Path, tmp_path: Path, ca
         assert angles_between(found, sky()).max() < 0.5
     said = capsys.readouterr().out
     assert "ball: centre row 72.3, column 81.6, radius 60.0 pixels" in said
+    assert said.endswith(
+        f"directions, no powers\nnext: photolin shape STACK OUT --some-lights "
+        f"{tmp_path / 'lights.lp'}\n"
+    )
     assert "warning" not in said
 
 

@@ -184,17 +184,19 @@ def describe_shape(shape: Shape) -> str:
     return " ".join(sentences)
 
 
-def doubt_shape(shape: Shape) -> str:
-    """That what was known of the scene fits badly, or nothing.
+def doubt_shape(shape: Shape) -> tuple[str, ...]:
+    """What looks wrong in what was known of the scene, or that it fits badly; mostly nothing.
 
     A wrong outline of a sphere shows in the residual of all its pixels by a third of what it does
     to normals, or less; in that of few points hardly at all.
     """
     found = shape.resolved
     limit, cause = MISFITS.get(found.kind, (math.inf, ""))
+    if found.doubts:
+        return tuple(f"{doubt[:1].upper()}{doubt[1:]}." for doubt in found.doubts)
     if found.residual <= limit:
-        return ""
-    return f"Off by {found.residual:.1f} degrees: {cause}."
+        return ()
+    return (f"Off by {found.residual:.1f} degrees: {cause}.",)
 
 
 def shape_status(used: Analysis, wanted: Analysis | None, thresholds: Thresholds) -> str:

@@ -223,9 +223,10 @@ def _thresholds(analysis: Analysis, stack: ImageStack | None) -> str:
 def _surface(shape: Shape) -> str:
     found = shape.resolved
     scale = "" if found.scaled else " Albedo has no absolute scale."
+    doubts = "".join(f"<p>Warning: {escape(doubt)}.</p>" for doubt in found.doubts)
     return (
         f"<h2>Surface</h2><p>Normals {escape(found.note)}. Residual {found.residual:.3g}, "
-        f"{escape(found.residual_means)}.{scale}</p>"
+        f"{escape(found.residual_means)}.{scale}</p>{doubts}"
         '<div class="plots">'
         f'<figure><img src="{normals_picture(shape.normals)}" alt="normals"><figcaption>Normals: '
         "red x right, green y up, blue z to the camera; gray where undetermined.</figcaption>"

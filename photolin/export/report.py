@@ -123,6 +123,7 @@ def describe_shape(shape: Shape) -> dict[str, Any]:
         "residuals": None if each is None else each.tolist(),
         "scaled": found.scaled,
         "note": found.note,
+        "warnings": list(found.doubts),
         "px_mm": shape.px_mm,
         "depth_unit": shape.unit,
         "axes": "x right, y up, z to the camera",
@@ -145,6 +146,7 @@ def restore_resolved(entry: dict[str, Any]) -> Resolved:
         bool(entry["scaled"]),
         str(entry["note"]),
         residuals,
+        tuple(map(str, entry.get("warnings", ()))),
     )
 
 

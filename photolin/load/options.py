@@ -23,7 +23,8 @@ class LoadOptions:
     mask: Path | None = None
     """Image file, bright on the object; the layout's own when left out."""
     lights: Literal["none"] | Path | None = None
-    """Lights file; the layout's own when left out; "none" ignores lights."""
+    """Lights file: a line of x y z for each image, right, up and to the camera, as long as the
+    light is strong; the layout's own when left out; "none" ignores lights."""
     dark: Path | None = None
     """Image taken with the lights off, subtracted from all; the layout's own when left out."""
     offset: float = 0.0

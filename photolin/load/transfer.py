@@ -21,6 +21,10 @@ WEIGHTS: dict[Channel, tuple[float, float, float]] = {
 their sum for all others. Luminance is that of Rec. 709 and sRGB."""
 
 
+STRIP = 64
+"""Rows that are looked up at once."""
+
+
 def decode_srgb(v: NDArray) -> NDArray:
     """The sRGB curve of IEC 61966-2-1, from stored to linear; 0 to 1 maps onto 0 to 1."""
     return np.where(v <= 0.04045, v / 12.92, ((np.maximum(v, 0.04045) + 0.055) / 1.055) ** 2.4)
@@ -35,7 +39,11 @@ def linear_plane(
     if stored.dtype.kind == "u" and stored.dtype.itemsize <= 2:
         # All values there can be, decoded once, in double precision.
         table = decode(np.arange(2 ** (8 * stored.dtype.itemsize)) / picture.full)
-        return table.astype(np.float32)[stored]
+        table, plane = table.astype(np.float32), np.empty(stored.shape, np.float32)
+        for row in range(0, len(stored), STRIP):  # numpy makes 8 bytes of every index
+            strip = slice(row, row + STRIP)
+            np.take(table, stored[strip], out=plane[strip], mode="clip")
+        return plane
     with np.errstate(over="ignore"):  # what single precision cannot hold is refused as infinite
         return decode(stored.astype(np.float64) / picture.full).astype(np.float32)
 

@@ -15,7 +15,7 @@ from .recover import Shape
 def measure_colour(
     path: Path, reading: LoadOptions, analysis: Analysis, found: Shape, progress: Progress
 ) -> NDArray[np.float32] | None:
-    """Albedo (H,W,3) of a colour stack; None where the images are gray or arrays.
+    """Albedo (H,W,3) of a colour stack, gray where no observation is D; None for gray or arrays.
 
     Args:
         path: of the stack.
@@ -31,4 +31,6 @@ def measure_colour(
         ]
     except InputError:
         return None
-    return np.stack(planes, axis=2)
+    colour = np.stack(planes, axis=2)
+    # where no observation is D, as in dark creases, nothing tells the colour
+    return np.where(np.isnan(colour).any(axis=2, keepdims=True), found.albedo[..., None], colour)

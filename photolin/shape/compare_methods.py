@@ -86,7 +86,7 @@ def compare_methods(
         if true.depth is not None:
             z = integrate_normals(normals, where, progress=progress, cancel=cancel)
         errors[method] = compare_surface(normals, true, depth=z, where=where)
-    place = "on the whole mask, where normals do not tell how far depth jumps at outlines"
+    place = "on the whole mask"
     place = place if true.thing is None else "on the object the truth names"
     how = POINTS if stack.lights is None else "the lights given with the stack"
     return MethodErrors(errors, int(where.sum()), f"{place}, resolved by {how}")

@@ -81,7 +81,8 @@ def _compare_depth(
     if true.depth is None or true.px_mm is None:
         return None
     try:
-        return compare_depth(depth.astype(np.float64) * true.px_mm, true.depth, there)
+        scaled = depth.astype(np.float64) * true.px_mm
+        return compare_depth(scaled, true.depth, there, true.normals, true.px_mm)
     except DegenerateError:  # no pixel has both
         return None
 
@@ -94,8 +95,9 @@ def describe_errors(errors: SurfaceErrors) -> list[str]:
     ]
     if errors.depth is not None:
         lines.append(
-            f"depth               rms {errors.depth.rms:.4f} mm, largest "
-            f"{errors.depth.largest:.4f} mm over {errors.depth.pixels} pixels"
+            f"depth               rms {errors.depth.rms:.4f}, median {errors.depth.median:.4f}, "
+            f"largest {errors.depth.largest:.4f} mm over {errors.depth.pixels} pixels in "
+            f"{errors.depth.parts} parts"
         )
     if errors.light is not None:
         lines.append(f"lights as found     {errors.light:.3f} degrees")

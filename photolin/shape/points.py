@@ -50,9 +50,8 @@ def resolve_from_points(
             "linearized values, lie nearly in one plane; points whose normals spread to all "
             "sides are accepted"
         ) from error
-    wrong = find_wrong(given, known) if len(known) > MIN_POINTS + 1 else None
-    kept = np.arange(len(known)) != (-1 if wrong is None else wrong)
-    if wrong is not None:
+    kept = keep_points(given, known)
+    if not kept.all():
         matrix = fit_directions(given[kept], known[kept])
     angles = angles_between(given @ matrix.T, known)
     residual = float(np.sqrt(np.square(angles[kept]).mean()))
@@ -63,7 +62,8 @@ def resolve_from_points(
     )
     if kept.sum() == MIN_POINTS:
         note += "; four points are fitted exactly, a fifth would check them"
-    if wrong is not None:
+    if not kept.all():
+        wrong = int(kept.argmin())
         note += (
             f"; the point at row {rows[wrong]}, column {columns[wrong]} was left out, it "
             f"contradicts all others by {angles[wrong]:.1f} degrees"
@@ -111,6 +111,12 @@ def read_points(
             )
     known = known / np.linalg.norm(known, axis=1, keepdims=True)
     return bases[:, rows, columns].T.astype(float), known
+
+
+def keep_points(given: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) all of the points, or all but one that contradicts the others."""
+    wrong = find_wrong(given, known) if len(known) > MIN_POINTS + 1 else None
+    return np.arange(len(known)) != (-1 if wrong is None else wrong)
 
 
 def find_wrong(given: NDArray[np.float64], known: NDArray[np.float64]) -> int | None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..analysis import Analysis, Cancel, Progress
 from ..errors import OptionError
 from ..stack import ImageStack
+from .axes import doubt_axes
 from .depth import integrate_normals
 from .grazing import fit_grazing
 from .normals import normals_from_bases
@@ -16,8 +17,8 @@ from .resolved import Resolved
 LEAST_MM, MOST_MM = 1e-6, 1e6
 """Sides of a pixel that are accepted, mm."""
 MOST_AWAY = 0.5
-"""Share of normals that face away from the camera, which sees none of those, from which on the note
-warns."""
+"""Share of normals that face away from the camera, which sees none of those, from which on it
+is doubted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +85,14 @@ def recover_shape(
     powers = np.linalg.norm(lights, axis=1)
     bases = fit_grazing(stack, analysis, powers, threads=threads, progress=progress, cancel=cancel)
     normals, albedo = normals_from_bases(bases, resolved.matrix)
+    doubts = [doubt_axes(analysis.linearized_bases, analysis.mask, resolved.matrix)]
     away = (normals[..., 2] < 0).sum() / max(analysis.determined().sum(), 1)
     if away > MOST_AWAY:
-        doubt = (
-            f"; {100 * away:.0f} % of the normals face away from the camera, as when the lights "
+        doubts.append(
+            f"{100 * away:.0f} % of the normals face away from the camera, as when the lights "
             "are given with z away from it"
         )
-        resolved = replace(resolved, note=resolved.note + doubt)
+    resolved = replace(resolved, doubts=(*resolved.doubts, *filter(None, doubts)))
     z = None
     if depth:
         z = integrate_normals(normals, analysis.mask, progress=progress, cancel=cancel)

@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis import Analysis
-from ..errors import InputError
+from ..errors import DegenerateError, InputError
+from .directions import normalize
 from .known import Known
-from .points import resolve_from_points
 from .resolved import Resolved
 from .some_lights import resolve_from_lights
 from .sphere import resolve_from_sphere, sphere_normals
 
 NOTHING = Known()
+PLANE = 1e-3
+"""Root mean square distance of unit vectors from a plane, as in `photolin.stack.check_lights`."""
 
 
 def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
@@ -31,6 +33,7 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
     """
     if known != NOTHING:
         found = _from_known(analysis, known)
+        check_lights_found(found.lights(analysis.coefficients))
         unused = "; the lights given with the stack served the linearization alone"
         return found if analysis.lights is None else replace(found, note=found.note + unused)
     if analysis.lights is None:
@@ -45,6 +48,19 @@ def resolve_ambiguity(analysis: Analysis, known: Known = NOTHING) -> Resolved:
     return Resolved(matrix, "lights", 0.0, True, "resolved by the lights given with the stack")
 
 
+def check_lights_found(lights: NDArray[np.float64]) -> None:
+    """Raise DegenerateError where what is known of the scene makes all lights (K,3) one plane's.
+
+    The images are not those of such lights: what is known is not true of them.
+    """
+    if np.linalg.svd(normalize(lights), compute_uv=False)[2] < PLANE * np.sqrt(len(lights)):
+        raise DegenerateError(
+            "what is known of the scene does not fit the images: all lights that follow from it "
+            "lie in one plane; accepted are rows, columns, normals or lights that belong to these "
+            "images"
+        )
+
+
 def _from_known(analysis: Analysis, known: Known) -> Resolved:
     bases, mask = analysis.linearized_bases, analysis.mask
     if known.lights:
@@ -53,7 +69,10 @@ def _from_known(analysis: Analysis, known: Known) -> Resolved:
     if known.points:
         rows, columns = np.array(known.points).T
         normals = np.array(known.normals) if known.normals else _on_sphere(known, mask.shape)
-        return resolve_from_points(bases, rows, columns, normals)
+        # what it needs of scipy takes a third of a second to import
+        from .surface_points import resolve_from_surface_points
+
+        return resolve_from_surface_points(bases, mask, rows, columns, normals)
     assert known.sphere is not None
     row, column, radius = known.sphere
     return resolve_from_sphere(bases, mask, (row, column), radius)

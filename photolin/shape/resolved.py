@@ -43,6 +43,8 @@ class Resolved:
     """One sentence for the user: what was used, how well it fits, what was assumed."""
     residuals: NDArray[np.float64] | None = None
     """(N,) degrees, of each given point or light, in their order; None for the other kinds."""
+    doubts: tuple[str, ...] = ()
+    """Sentences on what looks wrong in what was used."""
 
     def __post_init__(self) -> None:
         for array in (self.matrix, self.residuals):

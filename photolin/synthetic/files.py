@@ -46,9 +46,10 @@ labels    {shares} (percent of the mask's pixels, all images)
 """
 
 
-def write_scene(scene: Scene, folder: str | os.PathLike[str]) -> None:
+def write_scene(scene: Scene, folder: str | os.PathLike[str], *, lights: bool = False) -> None:
     """Write images/000.png ..., gt.npz, README.txt, and mask.png where the mask leaves pixels out.
 
+    With `lights` also lights.txt, ``name x y z``, directions times powers.
     Images are PNG of the scene's bits, 16 where it is not quantised. The folder appears whole or
     not at all.
 
@@ -62,11 +63,22 @@ def write_scene(scene: Scene, folder: str | os.PathLike[str]) -> None:
     try:
         (draft / "images").mkdir(parents=True)
         _fill(scene, draft)
+        if lights:
+            (draft / "lights.txt").write_text(_list_lights(scene))
         os.replace(draft, folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _list_lights(scene: Scene) -> str:
+    truth = scene.truth
+    vectors = truth.lights.astype(np.float64) * truth.power.astype(np.float64)[:, None]
+    return "".join(
+        f"{name} {x:.9g} {y:.9g} {z:.9g}\n"
+        for name, (x, y, z) in zip(scene.stack.names, vectors, strict=True)
+    )
 
 
 def _fill(scene: Scene, folder: Path) -> None:

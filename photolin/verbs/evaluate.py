@@ -6,7 +6,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from ..analysis import METHODS, Analysis, Method, Options
-from ..console import MEASURES, progress_bar, stop_at_ctrl_c, thresholds
+from ..console import explain_measures, progress_bar, stop_at_ctrl_c, thresholds
 from ..errors import DegenerateError, InputError
 from ..evaluate import Evaluation, format_evaluation, light_error, measure_surface
 from ..evaluate import evaluate as measure
@@ -50,9 +50,12 @@ def evaluate(
     """
     if is_result(path):
         if truth is None:
-            raise InputError(f"{path}: is a result; name its ground truth (gt.npz) after it")
-        print(evaluate_result(path, truth))
-        print(MEASURES)
+            raise InputError(
+                f"{path}: is a result; name its ground truth after it: gt.npz, "
+                "the folder that holds it, or a folder of DiLiGenT"
+            )
+        measured = evaluate_result(path, truth)
+        print(f"{measured}\n{explain_measures(measured)}")
         return
     answer, surface = read_truth(path if truth is None else truth)
     with progress_bar() as progress, stop_at_ctrl_c() as cancel:
@@ -72,7 +75,7 @@ def evaluate(
             surfaces = f"Table 3 is left out: {error}"
     for method, result in results.items():
         print(f"{method}: {thresholds(result)}, {result.seconds['total']:.2f} s")
-    print(f"{labels}{surfaces}\n{MEASURES}")
+    print(f"{labels}{surfaces}\n{explain_measures(labels + surfaces)}")
 
 
 def evaluate_result(path: Path, truth: Path) -> str:

@@ -21,6 +21,7 @@ def synth(
     bits: Literal[8, 16] = 16,
     ambient: float = 0.0,
     seed: int = 0,
+    lights: bool = False,
 ) -> None:
     """Render a scene with exact ground truth: images and gt.npz.
 
@@ -33,13 +34,16 @@ def synth(
         bits: Bits of a pixel.
         ambient: Constant light added everywhere, fraction of full scale.
         seed: Seed of the noise.
+        lights: Write lights.txt too, so that the lights are known: a line of name x y z for each
+            image, of the length of its power; x right, y up, z to the camera.
     """
     scene = render_scene(
         name, size=size, images=images, seed=seed, noise=noise, bits=bits, ambient=ambient
     )
-    write_scene(scene, out)
+    write_scene(scene, out, lights=lights)
     K, H, W = scene.stack.shape
-    print(f"written {K} images of {H} rows x {W} columns and gt.npz to {out}")
+    also = ", gt.npz and lights.txt" if lights else " and gt.npz"
+    print(f"written {K} images of {H} rows x {W} columns{also} to {out}")
 
 
 def info(stack: Positional[Path], reading: LoadOptions = LoadOptions()) -> None:

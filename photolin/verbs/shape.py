@@ -1,16 +1,18 @@
 """Verbs from linearized images to normals, depth and lights."""
 
 import os
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 from tyro.conf import Positional
 
 from ..analysis import Analysis, Cancel, Options, Progress
-from ..console import progress_bar, stop_at_ctrl_c
-from ..errors import InputError, OutputError
+from ..console import progress_bar, shape_summary, stop_at_ctrl_c
+from ..errors import InputError, OptionError, OutputError
 from ..export import (
     check_output,
     is_result,
@@ -44,25 +46,38 @@ def shape(
     px_mm: float | None = None,
     directx: bool = False,
     stack: Path | None = None,
+    powers: Literal["given", "unknown"] = "given",
     threads: int | None = None,
 ) -> None:
     """Normals, albedo, depth, mesh and lights of a stack or a result, as files in OUT.
 
     Without known lights, normals are known up to a 3x3 matrix. It is resolved by points of known
     normal, a sphere in the scene, the lights of some images, or, with none of these, by what makes
-    the normals those of a surface, up to the stated convention. Space is x right, y up, z to the
-    camera. A result brings its own analysis and reading options; those given apply to a stack.
+    the normals those of a surface, up to the stated convention. A result brings its own analysis
+    and reading options; those given apply to a stack.
+
+    Lights are lines of x y z for each image, or name x y z: towards the light, x right, y up, z to
+    the camera. Their length is the power of the light; all of length 1 says that all lights are
+    equally strong. In .lp files lengths say nothing, and lights count as equally strong.
+
+    Rows count downwards and columns to the right, from 0; whole numbers are centres of pixels: the
+    middle of H rows is row (H - 1) / 2.
 
     Args:
         path: What run accepts as stack, or a folder that run wrote.
         out: Folder for the files; made when missing. It may be that of the result itself.
         points: Text file of lines: row column x y z, a pixel of the images as read (inside roi)
-            and its unit normal. With sphere, lines of row column alone are points of that sphere.
-        sphere: Row and column of the centre of a sphere in the scene and its radius, pixels.
-        some_lights: Lights of some of the images, lines of: name x y z.
+            and its unit normal, x right, y up, z to the camera. With sphere, lines of row column
+            alone are points of that sphere.
+        sphere: Row and column of the centre of a sphere in the scene and its radius, pixels; a
+            pixel's own centre is at whole numbers.
+        some_lights: Lights of some of the images, or of all, lines of: name x y z. The lengths are
+            powers, unless all are 1 or the file is .lp: powers are then unknown and found.
         px_mm: Side of a pixel, mm: depth and mesh are then in mm, else in pixels.
         directx: Green of the normal map is y down (DirectX) instead of y up (OpenGL).
         stack: Where the images of a result are now, if they have moved.
+        powers: unknown takes the directions of the lights of the stack alone and finds their
+            powers from the images.
         threads: Processors to use; all when left out. The result does not depend on it.
     """
     check_output(out)
@@ -78,6 +93,9 @@ def shape(
         else:
             result, (images, seconds) = None, read_stack(path, reading, progress)
         known = read_known(images.names, points, sphere, some_lights)
+        if powers == "unknown":
+            images, known = free_powers(images, known, path, analyzed=given)
+            reading = replace(reading, lights="none")
         if result is None:
             result = analyze(images, analysis, threads=threads, progress=progress, cancel=cancel)
             result = replace(result, seconds={"load": seconds, **result.seconds})
@@ -91,10 +109,37 @@ def shape(
     check_kept(out, files, images.files)
     # all at once: an interruption leaves either all or what was there before
     write_files(out, files)
-    print(f"{result.title}: {found.resolved.note}")
-    if found.resolved.residual:
-        print(f"residual: {found.resolved.residual:.3g}, {found.resolved.residual_means}")
+    print(shape_summary(result, found.resolved))
     print(f"written {', '.join(files)} to {out}")
+
+
+def free_powers(
+    images: ImageStack, known: Known, path: Path, *, analyzed: bool
+) -> tuple[ImageStack, Known]:
+    """The stack without its lights, and their directions as what is known.
+
+    Raises:
+        InputError: it has no lights.
+        OptionError: it was analyzed with their powers, or something else is known as well.
+    """
+    if analyzed:
+        raise OptionError(
+            f"{path}: is a result, linearized with what was known of its lights; powers unknown is "
+            "accepted with the stack itself"
+        )
+    if known != NOTHING:
+        raise OptionError(
+            "powers unknown takes the directions of all lights; points, sphere and some_lights are "
+            "accepted without it"
+        )
+    if images.lights is None:
+        raise InputError(
+            f"{path}: has no lights; with powers unknown, a stack with light directions is accepted"
+        )
+    note = "powers: found from the images, the lengths of the lights are not used"
+    directions = tuple((x, y, z) for x, y, z in images.lights.tolist())
+    every = Known(images=tuple(range(len(directions))), lights=directions, powers=False)
+    return replace(images, lights=None, notes=(*images.notes, note)), every
 
 
 def measure_shape(
@@ -135,6 +180,10 @@ def lights(
 ) -> None:
     """Light directions from images of a mirror ball: OUT/lights.lp and light_directions.txt.
 
+    A ball does not show how strong a light is. photolin shape STACK OUT2 --some-lights
+    OUT/lights.lp takes directions alone, and the images of STACK tell the powers; as --lights they
+    would count as equally strong.
+
     Args:
         balls: Images of the ball, one for each light, with a mask of its disc.
         out: Folder for the files; made when missing.
@@ -165,4 +214,5 @@ def lights(
     write_files(out, files)
     row, column = found.centre
     print(f"ball: centre row {row:.1f}, column {column:.1f}, radius {found.radius:.1f} pixels")
-    print(f"written {', '.join(files)} to {out}")
+    print(f"written {', '.join(files)} to {out}: directions, no powers")
+    print(f"next: photolin shape STACK OUT --some-lights {shlex.quote(str(out / 'lights.lp'))}")

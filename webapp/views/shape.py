@@ -176,11 +176,11 @@ class ShapeView:
         found = frame.shape
         text = NO_SHAPE if found is None else describe_shape(found)
         note = f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
-        doubt = "" if found is None else doubt_shape(found)
+        doubts = () if found is None else doubt_shape(found)
         attention = "".join(
             '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
             f'{ATTENTION}">{escape(sentence)}</div>'
-            for sentence in (doubt, status_of(frame))
+            for sentence in (*doubts, status_of(frame))
             if sentence
         )
         self._note.content = f'<div id="{ID}">{attention}{note}</div>'
