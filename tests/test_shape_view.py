@@ -190,6 +190,14 @@ def test_a_misfit_asks_for_attention_before_the_sentence(view: ShapeView) -> Non
     )
 
 
+def test_doubts_of_a_shape_ask_for_attention(view: ShapeView) -> None:
+    doubted = replace(RECOVERED.shape.resolved, doubts=("the axes seem turned",))
+    shape = replace(RECOVERED.shape, resolved=doubted)
+    view.draw(frame(recovered=Recovered(shape, RESULT)))
+    assert ATTENTION in view._note.content
+    assert view._note.content.index("The axes seem turned") < view._note.content.index("Normals")
+
+
 def test_lights_of_the_stack_are_offered_first_where_there_are_some() -> None:
     lit = replace(STACK, lights=np.random.default_rng(0).normal(size=(9, 3)))
     server = open_server(port=0)
