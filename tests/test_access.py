@@ -30,7 +30,14 @@ from webapp.access import (
     open_server,
     refusal,
 )
-from webapp.values import MAX_TEXT, choose_option, clamp_integer, clamp_number
+from webapp.values import (
+    MAX_TEXT,
+    accepted_value,
+    choose_option,
+    clamp_integer,
+    clamp_number,
+    set_longest,
+)
 
 NAN, INF = math.nan, math.inf
 
@@ -522,3 +529,13 @@ def test_the_same_bytes_are_sent_once(app: App, tab: Tab, monkeypatch: pytest.Mo
         viser_internals.set_encoded(handle, encode_png(np.ones((2, 2, 3), np.uint8)), "png")
     assert sent == ["_format", "_data"]
     assert handle._data.startswith(b"\x89PNG")
+
+
+def test_a_text_field_takes_as_many_characters_as_it_was_told_to() -> None:
+    server = open_server(port=0)
+    notes, lines = (server.server.gui.add_text(name, "") for name in ("notes", "lines"))
+    set_longest(lines, MAX_TEXT + 5)
+    for handle, longest in ((notes, MAX_TEXT), (lines, MAX_TEXT + 5)):
+        assert accepted_value(handle, "x" * longest) == "x" * longest
+        assert accepted_value(handle, "x" * (longest + 1)) is None
+    server.stop()

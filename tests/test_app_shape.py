@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -21,18 +22,23 @@ from browser import (
     similarity,
     wait_for_colours,
     wait_until,
+    widget,
 )
 
 from photolin.analysis import Analysis, Options
+from photolin.export import load_result, load_shape, save_result
 from photolin.pipeline import analyze
+from photolin.shape.known import Known
+from photolin.shape.recover import Shape, recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp.app import App
+from webapp.frame import Recovered
+from webapp.pointed import Pointed
 from webapp.session import Session
 from webapp.source import Source
 from webapp.surface import render_surface
-from webapp.work import Recovered
 
 pytestmark = [
     pytest.mark.browser,
@@ -110,7 +116,49 @@ def dismiss_notes(page: Any) -> None:
 def click_all(page: Any, session: Session, pixels: tuple[tuple[int, int], ...]) -> None:
     for pixel in pixels:
         click_pixel(page, *pixel)
-        wait_until(lambda p=pixel: any(mark[:2] == p for mark in session._panels.shape.marks))
+        wait_until(lambda p=pixel: any(click.pixel == p for click in pointed(session).clicks))
+
+
+def pointed(session: Session) -> Pointed:
+    return session._panels.shape._sphere.pointed
+
+
+def ask_for_points(page: Any, session: Session) -> None:
+    """Begin to point out a sphere by points."""
+    choose(page, session._panels.shape._known, "points on a sphere")
+    wait_until(lambda: pointed(session).wanted == "points")
+    wait_until(lambda: session._panels.shape._sphere._in_view)
+    wait_until(lambda: drawn(page) is not None)
+
+
+def drawn(page: Any) -> tuple[int, int, bool] | None:
+    """How many rim clicks and points are on the picture, and whether the outline is dashed."""
+    found = page.evaluate(
+        """() => {
+            const all = (what) => document.querySelectorAll(`.photolin-sketch > ${what}`);
+            const outline = all("circle[fill=none]");
+            return outline.length === 0 ? null
+                : [all("path").length / 2, all("text").length,
+                   outline[0].hasAttribute("stroke-dasharray")];
+        }"""
+    )
+    return None if found is None else (found[0], found[1], found[2])
+
+
+def circle(page: Any) -> tuple[float, float, float]:
+    """Middle (x, y) and radius of the outline on screen, CSS pixels."""
+    found = page.locator(".photolin-sketch > circle[fill=none]").first
+    return tuple(float(found.get_attribute(name)) for name in ("cx", "cy", "r"))  # type: ignore[return-value]
+
+
+def refusal(page: Any) -> str:
+    """What is said when the shape is asked for and cannot be recovered; then it is put away."""
+    press(page, "n")
+    note = page.get_by_text("This did not work").first
+    note.wait_for(timeout=10_000)
+    said = page.locator(".mantine-Notification-root").all_inner_texts()
+    dismiss_notes(page)
+    return " ".join(said)
 
 
 def recovered(session: Session) -> Recovered:
@@ -124,8 +172,7 @@ def recovered(session: Session) -> Recovered:
 def recover(page: Any, session: Session) -> Recovered:
     """A shape by all pixels of the sphere."""
     session._panels.shape._known.value = "a whole sphere"
-    for handle, value in zip(session._panels.shape._numbers, (59.5, 79.5, RADIUS), strict=True):
-        handle.value = value
+    session._panels.shape._sphere.set((59.5, 79.5, RADIUS))
     press(page, "n")
     return recovered(session)
 
@@ -219,11 +266,18 @@ def test_three_clicks_on_the_rim_and_five_on_the_sphere_give_its_shape(
     page: Any, open_app: OpenApp
 ) -> None:
     session = enter(page, open_app())
-    choose(page, session._panels.shape._known, "points on a sphere")
-    push(page, "outline")
-    click_all(page, session, RIM)
-    wait_until(lambda: session._panels.shape._numbers[2].value == pytest.approx(RADIUS, abs=1))
+    ask_for_points(page, session)
+    wait_for_text(page, "1. Click the rim of the sphere three times: 0 of 3.")
+    assert drawn(page) == (0, 0, True)
     push(page, "points")
+    wait_for_text(page, "First the outline: click the rim")
+    assert "outline of the sphere is not set" in refusal(page)
+    click_all(page, session, RIM[:2])
+    wait_for_text(page, "2 of 3")
+    click_all(page, session, RIM[2:])
+    assert pointed(session).outline[2] == pytest.approx(RADIUS, abs=1)
+    wait_for_text(page, "2. Click five points on it, spread wide: 0 of 5.")
+    wait_until(lambda: drawn(page) == (3, 0, False))
     click_all(page, session, FIVE[:4])
     assert session._bench.work.recovered is None
     click_all(page, session, FIVE[4:])
@@ -311,7 +365,7 @@ def test_the_flat_picture_is_as_before_after_3d(page: Any, open_app: OpenApp) ->
     found = recover(page, session)
     expected = render_surface(found.shape, "relit", session._pointing.light, STACK.mask)[0]
     expected = np.repeat(expected[..., None], 3, axis=2)
-    page.add_style_tag(content=".photolin-light { visibility: hidden }")
+    page.add_style_tag(content=".photolin-light, .photolin-sketch { visibility: hidden }")
     wait_for_colours(page, expected)
     view, rotation = similarity(page), camera_rotation(page)
     turn_on(page)
@@ -408,7 +462,7 @@ def test_dragging_the_light_shows_the_scene_under_it(page: Any, open_app: OpenAp
     page.mouse.up()
     wait_until(lambda: session._pointing.light == pytest.approx((0.55, -0.35), abs=0.02))
     expected, caption = render_surface(found.shape, "relit", session._pointing.light, STACK.mask)
-    page.add_style_tag(content=".photolin-light { visibility: hidden }")
+    page.add_style_tag(content=".photolin-light, .photolin-sketch { visibility: hidden }")
     wait_for_colours(page, np.repeat(expected[..., None], 3, axis=2))
     page.mouse.move(300, 2)
     wait_for_text(page, caption)
@@ -428,28 +482,161 @@ def test_dragging_the_light_beyond_the_ball_stays_on_its_rim(page: Any, open_app
     wait_until(lambda: session._pointing.light == pytest.approx((-0.99, 0), abs=0.01))
 
 
-def test_what_does_not_work_is_told_in_the_words_of_the_command_line(
+def test_what_does_not_work_is_told_in_the_words_of_the_command_line_until_it_is_undone(
     page: Any, open_app: OpenApp
 ) -> None:
     session = enter(page, open_app())
-    choose(page, session._panels.shape._known, "points on a sphere")
-    for handle, value in zip(session._panels.shape._numbers, (59.5, 79.5, RADIUS), strict=True):
-        handle.value = value
+    ask_for_points(page, session)
+    session._panels.shape._sphere.set((59.5, 79.5, RADIUS))
     push(page, "points")
     click_all(page, session, ((60, 60), (60, 70), (60, 80), (60, 90), (60, 100)))
     wait_for_text(page, "This did not work")
     wait_for_text(page, "lie nearly in one plane")
     assert session._bench.work.recovered is None
-    wait_until(lambda: not session._bench.work._job._running)
-    click_pixel(page, 112, 2)  # where no note lies over the picture
-    wait_for_text(page, "the point at row 112, column 2 is outside the sphere")
+    push(page, "undo")
+    page.get_by_text("lie nearly in one plane").wait_for(state="detached")
+    assert len(pointed(session).points) == 4
 
     push(page, "clear")
-    push(page, "points")
-    dismiss_notes(page)
-    wait_until(lambda: not session._bench.work._job._running)
-    click_all(page, session, FIVE)
+    click_all(page, session, (*RIM, *FIVE))
     assert recovered(session).shape.resolved.residual < 2
+
+
+def test_a_click_outside_the_sphere_is_refused_at_once_and_not_kept(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app())
+    ask_for_points(page, session)
+    click_all(page, session, (*RIM, *FIVE[:4]))
+    click_pixel(page, 112, 2)
+    wait_for_text(page, "Row 112, column 2 is outside the outline")
+    assert pointed(session).points == FIVE[:4]
+    click_all(page, session, FIVE[4:])
+    page.get_by_text("is outside the outline").wait_for(state="detached")
+    assert recovered(session).shape.resolved.kind == "points"
+    assert session._pointing.pixel is None
+
+
+def test_undo_takes_back_one_click_and_the_outline_with_the_third_on_the_rim(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app())
+    ask_for_points(page, session)
+    guess = pointed(session).outline
+    click_all(page, session, (*RIM, *FIVE[:2]))
+    wait_until(lambda: drawn(page) == (3, 2, False))
+    push(page, "undo")
+    wait_for_text(page, "2. Click five points on it, spread wide: 1 of 5.")
+    wait_until(lambda: drawn(page) == (3, 1, False))
+    push(page, "undo")
+    push(page, "undo")
+    wait_for_text(page, "1. Click the rim of the sphere three times: 2 of 3.")
+    wait_until(lambda: drawn(page) == (2, 0, True))
+    assert pointed(session).outline == guess
+    assert "outline of the sphere is not set" in refusal(page)
+
+
+def test_the_outline_lies_on_the_picture_and_follows_the_numbers_and_the_view(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app())
+    ask_for_points(page, session)
+    click_all(page, session, RIM)
+    for radius in (None, "40"):
+        if radius is not None:
+            box = widget(page, session._panels.shape._sphere._numbers[2])
+            box.fill(radius)
+            box.press("Enter")
+            wait_until(lambda: pointed(session).outline[2] == 40)
+            leave_widgets(page)
+            page.mouse.move(300, 320)
+            page.mouse.wheel(0, -200)
+        row, column, size = pointed(session).outline
+        scale, left, top = similarity(page)
+        expected = (left + (column + 0.5) * scale, top + (row + 0.5) * scale, size * scale)
+        wait_until(lambda at=expected: circle(page) == pytest.approx(at, abs=0.01))
+    page.get_by_role("tab", name="Tune").click()
+    wait_until(lambda: drawn(page) is None)
+    leave_widgets(page)
+    click_pixel(page, 60, 80)
+    wait_until(lambda: session._pointing.pixel == (60, 80))
+    assert pointed(session).rim == RIM
+
+
+def test_in_3d_clicks_select_although_points_are_being_clicked(
+    page: Any, open_app: OpenApp
+) -> None:
+    session = enter(page, open_app())
+    ask_for_points(page, session)
+    click_all(page, session, (*RIM, *FIVE))
+    depth = recovered(session).shape.depth
+    assert depth is not None
+    session._panels.shape._arrows.value = False
+    turn_on(page)
+    rest(page)
+    wait_for_text(page, "In 3D clicks select pixels.")
+    assert drawn(page) is None
+    page.mouse.click(*on_screen(page, depth, (52, 90)))
+    wait_until(lambda: session._pointing.pixel is not None)
+    assert pointed(session).points == FIVE
+
+
+def test_a_click_while_a_shape_is_recovered_counts(
+    page: Any, open_app: OpenApp, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = enter(page, open_app())
+    held = Event()
+
+    def hold(*arguments: Any, **options: Any) -> Shape:
+        assert held.wait(20)
+        return recover_shape(*arguments, **options)
+
+    monkeypatch.setattr("webapp.work.recover_shape", hold)
+    ask_for_points(page, session)
+    click_all(page, session, (*RIM, *FIVE, (60, 100)))
+    held.set()
+    wait_for_text(page, "resolved by 6 points of known normal")
+
+
+def test_normals_are_pasted_as_lines(page: Any, open_app: OpenApp) -> None:
+    session = enter(page, open_app())
+    view = session._panels.shape
+    choose(page, view._known, "normals of some pixels")
+    lines = [" ".join(map(str, (*p, *SCENE.truth.normals[p].tolist()))) for p in FIVE]
+    box = page.locator("textarea:visible")
+    box.fill("\n".join(lines))
+    wait_until(lambda: view._list.value.count("\n") == 4)
+    push(page, "Recover shape")
+    assert recovered(session).shape.resolved.kind == "points"
+    wait_for_text(page, "resolved by 5 points of known normal")
+
+
+def test_a_result_with_a_shape_opens_with_it(page: Any, tmp_path: Path) -> None:
+    known = Known((59.5, 79.5, RADIUS))
+    shape = recover_shape(STACK, RESULT, resolve_ambiguity(RESULT, known), px_mm=0.5)
+    save_result(RESULT, tmp_path, shape=shape)
+    source = Source(STACK, load_result(tmp_path), OPTIONS, shape=load_shape(tmp_path))
+    app = App(source, port=0)
+    session = enter(page, app)
+    found = recovered(session)
+    assert found.shape is source.shape
+    assert session._read().layer == "relit"
+    wait_for_text(page, "resolved by a sphere at row 59.5, column 79.5")
+    assert session._panels.shape.known() == replace(
+        known, sphere=pytest.approx(known.sphere, abs=0.1)
+    )
+    assert session._panels.shape.px_mm() == 0.5
+    expected = render_surface(shape, "relit", session._pointing.light, STACK.mask)[0]
+    page.add_style_tag(content=".photolin-light, .photolin-sketch { visibility: hidden }")
+    wait_for_colours(page, np.repeat(expected[..., None], 3, axis=2))
+    press(page, "ArrowUp")
+    wait_until(lambda: session._read().layer == "depth")
+    session._exclude(3)
+    wait_until(lambda: session._frame is not None and session._frame.shape is None)
+    session._exclude(3)
+    assert recovered(session).shape is source.shape
+    assert "depth" in session._panels.picture._layer.options
+    app.stop()
 
 
 def test_a_shape_of_other_thresholds_says_so_until_it_is_recovered_again(
@@ -472,11 +659,15 @@ def test_files_of_the_shape_are_what_is_on_screen(
 ) -> None:
     session = enter(page, open_app())
     page.get_by_role("tab", name="Export").click()
-    choose(page, session._panels.export._kind, "shape (normals, albedo, depth, mesh, lights; zip)")
+    choose(page, session._panels.export._kind, "shape (maps and mesh, zip)")
     wait_until(lambda: session._panels.export._images.disabled)
     press(page, "e")
     wait_for_text(page, "there is no shape yet; recover one in the tab Shape (key: N)")
     found = recover(page, session)
+    directx = widget(page, session._panels.export._directx)
+    directx.check()
+    wait_until(lambda: session._panels.export.convention() == "directx")
+    leave_widgets(page)
     with page.expect_download() as started:
         press(page, "e")
     saved = tmp_path / started.value.suggested_filename
@@ -484,7 +675,10 @@ def test_files_of_the_shape_are_what_is_on_screen(
     assert saved.name == "sphere_obstacles_shape.zip"
     with zipfile.ZipFile(saved) as archive:
         normals = tifffile.imread(io.BytesIO(archive.read("normals.tif")))
-        assert {"mesh.ply", "mesh.obj", "lights.lp"} <= set(archive.namelist())
+        names = set(archive.namelist())
+    assert {"mesh.ply", "mesh.obj", "lights.lp", "result.npz", "report.json"} <= names
+    assert "normals_directx.png" in names
+    assert "normals_opengl.png" not in names
     assert np.array_equal(normals, found.shape.normals, equal_nan=True)
 
 

@@ -22,8 +22,9 @@ from photolin.analysis import Options
 from photolin.cli import VERBS, main
 from photolin.compiling import COMPILING
 from photolin.errors import Cancelled
-from photolin.export import load_result, load_result_stack
+from photolin.export import load_result, load_result_stack, load_shape
 from photolin.factors import Factor
+from photolin.synthetic import load_truth
 from webapp.source import Source
 
 ROOT = Path(__file__).parent.parent
@@ -127,6 +128,43 @@ def test_what_inspect_lets_download_finds_its_stack_again(
         assert report["stack"] == str(place)
         assert report["load"]["roi"] == [4, 40, 8, 56]
         assert served[-1].stack.shape == (8, 36, 48)
+
+
+def test_inspect_opens_a_result_with_the_shape_that_was_recovered_from_it(
+    stack: Path, tmp_path: Path, monkeypatch
+) -> None:
+    served: list[Source] = []
+    monkeypatch.setattr("webapp.app.serve", lambda source, **_: served.append(source))
+    run, out = tmp_path / "run", tmp_path / "out"
+    assert main(["run", str(stack), str(run), "--T", "0.02"]) == 0
+    assert main(["shape", str(run), str(out), "--px-mm", "0.5"]) == 0
+    for folder in (run, out):
+        assert main(["inspect", str(folder)]) == 0
+    without, found = (source.shape for source in served)
+    expected = load_shape(out)
+    assert without is None
+    assert found is not None
+    assert expected is not None
+    assert np.array_equal(found.normals, expected.normals, equal_nan=True)
+    assert np.array_equal(found.depth, expected.depth, equal_nan=True)
+    assert found.px_mm == 0.5
+
+
+def test_inspect_leaves_out_normals_that_a_run_made_by_the_way(
+    stack: Path, tmp_path: Path, monkeypatch
+) -> None:
+    served: list[Source] = []
+    monkeypatch.setattr("webapp.app.serve", lambda source, **_: served.append(source))
+    lights = tmp_path / "lights.txt"
+    truth = load_truth(stack)
+    np.savetxt(lights, truth.lights * truth.power[:, None])
+    out = tmp_path / "out"
+    assert main(["run", str(stack), str(out), "--T", "0.02", "--lights", str(lights)]) == 0
+    shape = load_shape(out)
+    assert shape is not None
+    assert shape.depth is None
+    assert main(["inspect", str(out)]) == 0
+    assert served[0].shape is None
 
 
 def test_a_result_refuses_images_that_changed(stack: Path, tmp_path: Path, capsys) -> None:

@@ -1,6 +1,7 @@
 """What a tab says beside the picture."""
 
 from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,8 +16,10 @@ class Client:
     def __init__(self) -> None:
         self.notes: list[tuple[str, str, float | None, str]] = []
 
-    def add_notification(self, title: str, body: str, **how: Any) -> None:
-        self.notes.append((title, body, how["auto_close_seconds"], how["color"]))
+    def add_notification(self, title: str, body: str, **how: Any) -> Any:
+        note = (title, body, how["auto_close_seconds"], how["color"])
+        self.notes.append(note)
+        return SimpleNamespace(remove=lambda: self.notes.remove(note))
 
 
 @pytest.fixture
@@ -58,3 +61,23 @@ def test_a_closed_tab_is_told_nothing(client: Client, capsys: pytest.CaptureFixt
     said.refuse()
     assert client.notes == []
     assert capsys.readouterr().err == ""
+
+
+def test_what_did_not_work_is_taken_back_and_nothing_else(client: Client) -> None:
+    said = notices(client)
+    said.retract()
+    said.tell(InputError("one"))
+    said.say("Session", "cannot be written", "red")
+    said.tell(InputError("two"))
+    said.retract()
+    said.retract()
+    assert [note[0] for note in client.notes] == ["Session"]
+
+
+def test_nothing_is_taken_back_in_a_closed_tab(client: Client) -> None:
+    closed = Event()
+    said = notices(client, closed)
+    said.tell(InputError("one"))
+    closed.set()
+    said.retract()
+    assert len(client.notes) == 1

@@ -8,7 +8,7 @@ import pytest
 
 from photolin.shape.recover import Shape
 from photolin.shape.resolved import Resolved
-from webapp.relief import ARROW, ARROWS, CHOSEN, MESH, Relief
+from webapp.relief import ARROW_SHOWN, ARROWS, FAINT, FULL, MESH, Relief
 
 H, W, WORLD = 20, 30, 10.0
 PIXEL = WORLD / H
@@ -122,15 +122,19 @@ def test_arrows_come_from_the_lights_and_point_to_the_middle(
 ) -> None:
     lights = np.array([[0, 0, 2.0], [3, 0, 0.01], [0, 0.5, 0.5]])
     relief.set_arrows(make_shape(None, lights), 1)
-    points, colours = client.scene.nodes[ARROWS]
-    tails, heads = points[:, 0], points[:, 1]
     towards = lights / np.linalg.norm(lights, axis=1, keepdims=True) * [1, -1, -1]
-    for ends in (tails, heads):
-        lengths = np.linalg.norm(ends, axis=1)
-        assert ends / lengths[:, None] == pytest.approx(towards, abs=1e-6)
-    assert (np.linalg.norm(tails, axis=1) > np.linalg.norm(heads, axis=1)).all()
-    assert colours.tolist() == [list(ARROW), list(CHOSEN), list(ARROW)]
+    diagonal = float(np.hypot(H, W)) * PIXEL
+    for name, numbers, look in ((ARROWS, [0, 2], FAINT), (ARROW_SHOWN, [1], FULL)):
+        points, colours = client.scene.nodes[name]
+        tails, heads = points[:, 0], points[:, 1]
+        for ends in (tails, heads):
+            lengths = np.linalg.norm(ends, axis=1)
+            assert ends / lengths[:, None] == pytest.approx(towards[numbers], abs=1e-6)
+        lengths = np.linalg.norm(tails, axis=1) - np.linalg.norm(heads, axis=1)
+        assert lengths == pytest.approx(look.long * diagonal, rel=1e-4)
+        assert colours.tolist() == [list(look.colour)] * len(numbers)
     relief.set_arrows(make_shape(None, lights), 2)
-    assert client.scene.nodes[ARROWS][1].tolist()[2] == list(CHOSEN)
+    (shown,) = client.scene.nodes[ARROW_SHOWN][0]
+    assert shown[1] / np.linalg.norm(shown[1]) == pytest.approx(towards[2], abs=1e-6)
     relief.set_arrows(None, 0)
     assert client.scene.nodes == {}

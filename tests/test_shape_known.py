@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from photolin.errors import InputError, OptionError
-from photolin.shape.known import Known, read_known
+from photolin.shape.known import Known, lights_in_text, points_in_text, read_known
 
 NAMES = ("a 1.png", "B2.png", "c.png", "d.png", "e.png")
 POINTS = "1 2 0 0 1\n30 4 0.6 0 0.8\n"
@@ -171,3 +171,41 @@ def test_numbers_are_plain_python_so_that_equal_knowledge_is_equal(tmp_path: Pat
     known = read_known(NAMES, write(tmp_path, POINTS))
     assert {type(value) for point in known.points for value in point} == {int}
     assert not any(isinstance(value, np.generic) for n in known.normals for value in n)
+
+
+# Text that is no file
+
+
+def test_text_is_read_as_the_file_that_holds_it(tmp_path: Path) -> None:
+    assert points_in_text(POINTS, "the list") == EXPECTED
+    bare, sphere = "1 2\n30 4\n", (10.0, 20.0, 30.0)
+    assert points_in_text(bare, "the list", sphere) == read_known(
+        NAMES, write(tmp_path, bare), sphere
+    )
+    lights = "c.png 0 0 2\nA 1.png 0 1 1\nd.png 1 0 1"
+    known = lights_in_text(lights, NAMES, "the list")
+    assert known == read_known(NAMES, lights=write(tmp_path, lights))
+    assert known.powers
+    positions = lights_in_text(lights, NAMES, "the list", positions=True)
+    assert positions == read_known(NAMES, lights=write(tmp_path, lights, "given.lp"))
+    assert not positions.powers
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "the list: holds no lines of three numbers"),
+        ("c.png 0 0", "the list, line 1: 'c.png 0 0' is not three numbers"),
+        (
+            "c.png 0 0 1\nz.png 0 0 1",
+            "the list: 'z.png' is no image of the stack; names such as a 1",
+        ),
+        ("0 0 1", "the list: 'a line without a name' is no image"),
+    ],
+)
+def test_lights_in_text_that_cannot_be_used_are_told_with_their_place(
+    text: str, words: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        lights_in_text(text, NAMES, "the list")
+    assert words in str(caught.value)

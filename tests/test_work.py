@@ -5,23 +5,32 @@ import threading
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
+import imagecodecs
 import numpy as np
 import pytest
+import tifffile
 
-from photolin.analysis import Options
+from photolin.analysis import Analysis, Options
 from photolin.errors import Cancelled, InputError, OptionError
+from photolin.export import load_result, load_shape, write_files
+from photolin.export.maps import normals_png
 from photolin.export.surface import surface_files
 from photolin.factors import Thresholds
+from photolin.load import load_stack
 from photolin.pipeline import analyze
 from photolin.shape.known import Known
+from photolin.shape.recover import Shape, recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 from photolin.synthetic import render_scene
 from webapp import work as module
+from webapp.desk import Desk
 from webapp.runs import Runs
 from webapp.source import Source
 from webapp.state import ViewState
-from webapp.work import EMPTY, Desk, Work, cancelling
+from webapp.work import EMPTY, Work, cancelling
 
 SCENE = render_scene("sphere_obstacles", size=(48, 64), images=9)
 STACK = replace(SCENE.stack, lights=SCENE.truth.lights * SCENE.truth.power[:, None])
@@ -168,12 +177,132 @@ def test_files_of_a_shape_are_those_of_the_command_line(work: Work, tab: Tab) ->
     assert name == "sphere_obstacles_shape.zip"
     assert work.recovered is not None
     expected = surface_files(work.recovered.shape, work.recovered.analysis)
-    with zipfile.ZipFile(io.BytesIO(tab.sent[name])) as archive:
-        found = {each: archive.read(each) for each in archive.namelist()}
-    assert set(found) == set(expected)
+    found = unpack(tab.sent[name])
+    assert set(found) == {*expected, "result.npz", "report.json"}
+    assert "normals_opengl.png" in found
     assert {"normals.tif", "albedo.tif", "depth.tif", "mesh.ply", "lights.lp"} <= set(found)
     assert found["depth.tif"] == expected["depth.tif"]
     assert found["lights.lp"] == expected["lights.lp"]
+
+
+def test_the_result_in_the_files_of_a_shape_opens_with_it(
+    work: Work, tab: Tab, tmp_path: Path
+) -> None:
+    work.recover(Known(), given_lights=True, px_mm=0.5)
+    tab.wait()
+    work.download("shape", everything=False, notes="")
+    tab.wait()
+    write_files(tmp_path, unpack(tab.sent["sphere_obstacles_shape.zip"]))
+    assert np.array_equal(load_result(tmp_path).labels, RESULT.labels)
+    found = load_shape(tmp_path)
+    assert found is not None
+    assert work.recovered is not None
+    assert np.array_equal(found.normals, work.recovered.shape.normals, equal_nan=True)
+    assert found.px_mm == 0.5
+
+
+def test_normals_for_directx_are_named_so(work: Work, tab: Tab) -> None:
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert work.recovered is not None
+    work.download("shape", everything=False, notes="", convention="directx")
+    tab.wait()
+    found = unpack(tab.sent["sphere_obstacles_shape.zip"])
+    assert found["normals_directx.png"] == normals_png(work.recovered.shape.normals, "directx")
+    assert "normals_opengl.png" not in found
+
+
+def test_files_of_a_shape_have_the_colour_of_the_stack_s_files(tab: Tab, tmp_path: Path) -> None:
+    source, result = colour_source(tmp_path)
+    work = Work(Runs(source.stack, OPTIONS, result), source, result.thresholds, tab.desk())
+    work.recover(Known(), given_lights=False, px_mm=None)
+    tab.wait()
+    work.download("shape", everything=False, notes="")
+    tab.wait()
+    assert tab.told == []
+    (data,) = tab.sent.values()
+    albedo = tifffile.imread(io.BytesIO(unpack(data)["albedo.tif"]))
+    assert albedo.shape == (48, 64, 3)
+    lit = np.isfinite(albedo).all(axis=2) & (albedo[..., 0] > 0.05)
+    assert np.median(albedo[lit][:, 1] / albedo[lit][:, 0]) == pytest.approx(0.5, rel=1e-3)
+
+
+def colour_source(folder: Path) -> tuple[Source, Analysis]:
+    """A stack that is half as green as it is red, and its result."""
+    for k, image in enumerate(STACK.images):
+        planes = [np.round(share * image * 65535) for share in (1, 0.5, 0.25)]
+        pixels = np.stack(planes, axis=-1).astype(np.uint16)
+        (folder / f"{k}.png").write_bytes(imagecodecs.png_encode(pixels))
+    source = Source(load_stack(folder), path=folder)
+    return source, analyze(source.stack, OPTIONS)
+
+
+def unpack(data: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_a_shape_that_came_with_the_result_is_there_at_once(work: Work, tab: Tab) -> None:
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert work.recovered is not None
+    source = Source(STACK, RESULT, shape=work.recovered.shape)
+    again = Work(Runs(STACK, OPTIONS, RESULT), source, RESULT.thresholds, tab.desk())
+    assert again.recovered is not None
+    assert again.recovered.shape is source.shape
+    assert again.recovered.analysis is RESULT
+    fewer = Work(Runs(STACK, OPTIONS), source, RESULT.thresholds, tab.desk())
+    assert fewer.recovered is None
+
+
+def test_what_is_asked_for_while_a_shape_is_recovered_follows_it_and_only_the_latest(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended, scales = threading.Semaphore(0), threading.Semaphore(0), []
+
+    def hold(*arguments: Any, px_mm: float, **options: Any) -> Shape:
+        scales.append(px_mm)
+        begun.release()
+        assert ended.acquire(timeout=10)
+        return recover_shape(*arguments, px_mm=px_mm, **options)
+
+    monkeypatch.setattr(module, "recover_shape", hold)
+    for px_mm in (1.0, 2.0, 3.0):
+        work.recover(Known(), given_lights=True, px_mm=px_mm)
+        if px_mm == 1:
+            assert begun.acquire(timeout=10)
+    assert tab.refused == 0
+    ended.release()
+    tab.wait()
+    work.ensure(tab.state)  # as a tab does whenever something is to be drawn
+    assert begun.acquire(timeout=10)
+    ended.release()
+    tab.wait()
+    work.ensure(tab.state)
+    assert scales == [1.0, 3.0]
+    assert work.recovered is not None
+    assert work.recovered.shape.px_mm == 3.0
+
+
+def test_cancelling_forgets_what_waits_too(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def hold(*_: object, **__: object) -> None:
+        begun.set()
+        assert ended.wait(10)
+        raise Cancelled("depth was cancelled")
+
+    monkeypatch.setattr(module, "recover_shape", hold)
+    work.recover(Known(), given_lights=True, px_mm=None)
+    assert begun.wait(10)
+    work.recover(Known(), given_lights=True, px_mm=None)
+    work.stop()
+    ended.set()
+    tab.wait()
+    work.ensure(tab.state)
+    assert tab.busy == [True, False]
 
 
 def test_files_of_a_shape_that_is_not_there_are_refused_with_the_way_to_it(

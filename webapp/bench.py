@@ -9,10 +9,11 @@ from collections.abc import Callable
 from photolin.factors import Thresholds
 
 from .catch_up import CatchUp
+from .desk import Desk
 from .live import Live
 from .runs import Runs
 from .selections import Selections
-from .work import Desk, Work
+from .work import Work
 
 
 class Bench:

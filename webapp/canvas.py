@@ -10,6 +10,7 @@ Callbacks run one at a time on viser's event loop, which all tabs share: they mu
 import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -23,6 +24,7 @@ from .hint import HINT
 from .keys import KEYS
 from .relief import MESH, Relief
 from .second import PLANES, Second
+from .sketch import Sketch
 from .state import Pixel
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
@@ -129,6 +131,11 @@ class Canvas:
     def set_light(self, light: tuple[float, float] | None) -> None:
         """Show the ball on which a light is dragged, at x right, y up; None hides it."""
         call_javascript(self._client, "window.photolin.setLight", light)
+
+    def set_sketch(self, sketch: Sketch | None) -> None:
+        """Draw what is known of a sphere on the flat picture, in place of the earlier; or not."""
+        told = None if sketch is None else asdict(sketch)
+        call_javascript(self._client, "window.photolin.setSketch", told)
 
     def set_sampling(self, colour: str | None) -> None:
         """Let drags draw rectangles of a CSS colour "#rrggbb"; None: they move the picture again.

@@ -3,10 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from photolin.analysis import Analysis
 from photolin.errors import OptionError
 from photolin.export import export_files, result_files, safe_name, zip_files
 from photolin.export.html import report_html
+from photolin.export.maps import Convention
 from photolin.export.surface import surface_files
 from photolin.factors import Thresholds
 from photolin.label import label_images
@@ -82,13 +86,20 @@ def make_report(
     return f"{stem}_report.html", page
 
 
-def make_shape_download(recovered: Recovered | None) -> tuple[str, bytes]:
-    """Name and bytes of a zip of normals, albedo, depth, mesh and lights.
+def make_shape_download(
+    recovered: Recovered,
+    result: Mapping[str, bytes],
+    colour: NDArray[np.float32] | None = None,
+    convention: Convention = "opengl",
+) -> tuple[str, bytes]:
+    """Name and bytes of a zip of what `photolin shape` writes.
 
-    Raises:
-        OptionError: there is no shape.
+    Args:
+        result: the files of the result and its shape, as `result_files` gives them.
+        colour: (H,W,3) albedo of the channels, in place of the shape's own.
+        convention: of the PNG of the normals.
     """
-    if recovered is None:
-        raise OptionError("there is no shape yet; recover one in the tab Shape (key: N)")
-    stem = safe_name(recovered.analysis.title) or "stack"
-    return f"{stem}_shape.zip", zip_files(surface_files(recovered.shape, recovered.analysis))
+    found, analysis = recovered.shape, recovered.analysis
+    stem = safe_name(analysis.title) or "stack"
+    files = surface_files(found, analysis, colour, convention)
+    return f"{stem}_shape.zip", zip_files({**result, **files})

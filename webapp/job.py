@@ -1,7 +1,10 @@
 """Long work of one tab: one piece at a time, in a thread of its own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Event, Lock, Thread
+
+from photolin.errors import Cancelled
 
 
 class Job:
@@ -57,3 +60,12 @@ class Job:
             with self._lock:
                 self._running = False
             self._ended()
+
+
+@contextmanager
+def cancelling(what: str, then: str) -> Iterator[None]:
+    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
+    try:
+        yield
+    except Cancelled as error:
+        raise Cancelled(f"{what} cancelled; {then}") from error

@@ -50,6 +50,8 @@ class Actions:
     """Send files of a kind, of all images or of the one shown."""
     recover: Callable[[], None]
     """Recover the shape."""
+    retract: Callable[[], None]
+    """Take back what was said of what did not work."""
     pin: Callable[[], None]
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
@@ -120,7 +122,9 @@ class Panels:
             self.compare = CompareView(gui, clicks, changed, add_choice, known=known)
             canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
-            self.shape = ShapeView(gui, stack, changed, actions.recover)
+            retry = (actions.recover, actions.retract)
+            self.shape = ShapeView(gui, stack, changed, *retry, canvas.set_sketch)
+            clicks.see("shape", self.shape.see)
             self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):
             self.export = ExportView(gui, actions.download, self.run.add_progress)
@@ -170,10 +174,6 @@ class Panels:
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""
         return self.samples.take(pixel) or self.shape.take(pixel)
-
-    def marks(self) -> tuple[tuple[int, int, str], ...]:
-        """(row, column, text) of what was clicked for panels."""
-        return self.shape.marks
 
     def press(self, key: str) -> None:
         """Do what a key stands for, if anything."""

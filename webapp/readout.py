@@ -4,6 +4,7 @@ Intensities are fractions of full scale, with three decimals; thresholds and wha
 them have four, and more where four would hide why a comparison came out as it did.
 """
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -13,6 +14,14 @@ from numpy.typing import NDArray
 from photolin.analysis import Analysis
 from photolin.factors import LETTERS, OUTSIDE, TITLES, Factor, Thresholds, classify
 from photolin.shape.recover import Shape
+from photolin.shape.resolved import Kind
+
+MISFITS: dict[Kind, tuple[float, str]] = {
+    "sphere": (1.5, "the outline may be wrong, or not that of a matte sphere"),
+    "points": (3.0, "the outline or a point may be wrong, or the surface too glossy"),
+    "some lights": (3.0, "a light may be that of another image, or have another power"),
+}
+"""Residuals in degrees above which a shape is doubted, and what may be wrong then."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +182,19 @@ def describe_shape(shape: Shape) -> str:
     if not found.scaled:
         sentences.append("Albedo has no absolute scale.")
     return " ".join(sentences)
+
+
+def doubt_shape(shape: Shape) -> str:
+    """That what was known of the scene fits badly, or nothing.
+
+    A wrong outline of a sphere shows in the residual of all its pixels by a third of what it does
+    to normals, or less; in that of few points hardly at all.
+    """
+    found = shape.resolved
+    limit, cause = MISFITS.get(found.kind, (math.inf, ""))
+    if found.residual <= limit:
+        return ""
+    return f"Off by {found.residual:.1f} degrees: {cause}."
 
 
 def shape_status(used: Analysis, wanted: Analysis | None, thresholds: Thresholds) -> str:

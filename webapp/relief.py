@@ -4,6 +4,8 @@ In viser's world the picture lies in the plane of x (right) and y (down), and th
 negative z; so a height towards the camera is a negative z there.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -15,13 +17,25 @@ from photolin.shape.recover import Shape
 from .ray import meet_relief, ray_in_text
 from .state import Pixel
 
-MESH, ARROWS = "/canvas/relief", "/canvas/lights"
+MESH, ARROWS, ARROW_SHOWN = "/canvas/relief", "/canvas/lights", "/canvas/light"
 MOST_VERTICES = 150_000
 """Of the mesh in the browser."""
-FAR, LONG = 0.36, 0.1
-"""Where arrows end and how long they are, in diagonals of the picture."""
-ARROW, CHOSEN = (250, 220, 90), (255, 120, 40)
-"""Colours of the lights, and of that of the image shown."""
+FAR = 0.36
+"""Where arrows end, in diagonals of the picture."""
+
+
+class Look(NamedTuple):
+    """Of an arrow."""
+
+    colour: tuple[int, int, int]
+    long: float
+    """In diagonals of the picture."""
+    thick: float
+    """Its head, in diagonals of the picture."""
+
+
+FAINT, FULL = Look((128, 116, 64), 0.03, 0.004), Look((255, 140, 40), 0.09, 0.009)
+"""Of the lights, and of that of the image shown."""
 
 
 class Relief:
@@ -50,24 +64,27 @@ class Relief:
         )
 
     def set_arrows(self, shape: Shape | None, chosen: int) -> None:
-        """Draw the lights as arrows towards the scene, that of image `chosen` in a colour.
+        """Draw the lights as faint arrows towards the scene, that of image `chosen` in full.
 
         None removes them.
         """
-        self._client.scene.remove_by_name(ARROWS)
+        for name in (ARROWS, ARROW_SHOWN):
+            self._client.scene.remove_by_name(name)
         if shape is None:
             return
-        diagonal = float(np.hypot(*self._shape)) * self._pixel
         towards = shape.lights / np.linalg.norm(shape.lights, axis=1, keepdims=True)
         towards = towards * [1, -1, -1]
-        points = np.stack([towards * (FAR + LONG), towards * FAR], axis=1) * diagonal
-        colours = np.tile(np.array(ARROW, np.uint8), (len(points), 1))
-        colours[chosen] = CHOSEN
-        size = 0.012 * diagonal
+        self._draw_arrows(ARROWS, np.delete(towards, chosen, axis=0), FAINT)
+        self._draw_arrows(ARROW_SHOWN, towards[[chosen]], FULL)
+
+    def _draw_arrows(self, name: str, towards: NDArray[np.float64], look: Look) -> None:
+        diagonal = float(np.hypot(*self._shape)) * self._pixel
+        points = np.stack([towards * (FAR + look.long), towards * FAR], axis=1) * diagonal
+        size = look.thick * diagonal
         self._client.scene.add_arrows(
-            ARROWS,
+            name,
             points.astype(np.float32),
-            colours,
+            np.tile(np.array(look.colour, np.uint8), (len(points), 1)),
             shaft_radius=size / 4,
             head_radius=size,
             head_length=2.5 * size,

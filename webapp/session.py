@@ -18,6 +18,7 @@ from photolin.factors import Thresholds
 
 from .bench import Bench
 from .canvas import Canvas
+from .desk import Desk
 from .frame import Frame, compose
 from .keeper import Keeper
 from .live import Preview
@@ -29,7 +30,6 @@ from .saved import Saved
 from .selections import Selections
 from .state import SURFACE, Pixel, ViewState
 from .theme import set_theme
-from .work import Desk
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
@@ -67,6 +67,9 @@ class Session:
         self._changed = monotonic()
         self._pointing = Pointing(self._wake.set)
         self._build(start.state)
+        if (found := self._bench.work.recovered) is not None:  # a result came with it
+            self._shaped()
+            self._panels.shape.recall(found.shape.resolved, found.shape.px_mm)
         if again:
             self._pointing.restore(start.state)
             self._panels.restore(start)
@@ -132,6 +135,7 @@ class Session:
         self._client.send_file_download(name, data, save_immediately=True)
 
     def _shaped(self) -> None:
+        self.notices.retract()
         self._panels.picture.offer(surface=True)
         if self._read().layer not in SURFACE:
             self._panels.picture.show("relit")
@@ -147,6 +151,7 @@ class Session:
             stop=self._bench.stop,
             download=self._download,
             recover=self._recover,
+            retract=self.notices.retract,
             exclude=self._exclude,
             copy=self._copy,
             pin=self._pointing.pin,
@@ -172,7 +177,8 @@ class Session:
             self._pointing.select(pixel)
 
     def _download(self, kind: str, everything: bool) -> None:
-        self._bench.work.download(kind, everything, self._panels.notes.read())
+        notes, convention = self._panels.notes.read(), self._panels.export.convention()
+        self._bench.work.download(kind, everything, notes, convention)
 
     def _exclude(self, image: int) -> None:
         """Leave an image of the whole stack out, or take it in again."""
@@ -223,8 +229,7 @@ class Session:
         bench.work.ensure(state)
         preview = self._follow(state, results)
         recovered = bench.work.recovered
-        pins = tuple((*pin, str(n)) for n, pin in enumerate(state.pins, 1))
-        marks = (*pins, *self._panels.marks())
+        marks = tuple((*pin, str(n)) for n, pin in enumerate(state.pins, 1))
         known = (
             frame is not None
             and (state, recovered) == (frame.state, frame.recovered)
@@ -268,6 +273,8 @@ class Session:
         now = [k for k in range(count) if k not in self._bench.runs.excluded]
         image = next((n for n, k in enumerate(now) if k >= left[shown]), len(now) - 1)
         self._panels.picture.restock(len(now), image)
+        if self._bench.work.recovered is not None:
+            self._panels.picture.offer(surface=True)
 
     def _keep(self, state: ViewState, rested: bool) -> bool:
         """Keep the session once it rests; whether that is still to come.

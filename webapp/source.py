@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.analysis import Analysis, Options
+from photolin.analysis import Analysis, Options, Progress
 from photolin.command import run_command
 from photolin.errors import InputError
 from photolin.export import result_files, safe_name
 from photolin.factors import Thresholds
 from photolin.load import LoadOptions
+from photolin.shape.channels import measure_colour
+from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 
@@ -38,6 +40,8 @@ class Source:
     """How the stack was read, and which of its images are left out at first."""
     truth: NDArray[np.uint8] | None = None
     """(K,H,W) true Factor codes of all images; None where they are not known."""
+    shape: Shape | None = None
+    """That was recovered from `result` before; shown at once."""
 
     def __post_init__(self) -> None:
         if self.truth is not None and self.truth.shape != self.stack.shape:
@@ -61,11 +65,23 @@ class Source:
         reading = replace(self.reading, exclude=excluded)
         return run_command(self.path, out, options, reading, thresholds)
 
-    def pack(self, analysis: Analysis, excluded: tuple[int, ...]) -> Mapping[str, bytes]:
-        """The files of a result, name to bytes, as `result_files` gives them."""
+    def pack(
+        self, analysis: Analysis, excluded: tuple[int, ...], shape: Shape | None = None
+    ) -> Mapping[str, bytes]:
+        """The files of a result and of its shape, name to bytes, as `result_files` gives them."""
         return result_files(
             analysis,
+            shape=shape,
             command=self.command(analysis.options, analysis.thresholds, excluded),
             stack_path=self.path,
             load_options=None if self.path is None else replace(self.reading, exclude=excluded),
         )
+
+    def colour(
+        self, analysis: Analysis, excluded: tuple[int, ...], shape: Shape, progress: Progress
+    ) -> NDArray[np.float32] | None:
+        """Albedo (H,W,3) of a shape of `analysis`, where the stack's files are there in colour."""
+        if self.path is None:
+            return None
+        reading = replace(self.reading, exclude=excluded)
+        return measure_colour(self.path, reading, analysis, shape, progress)

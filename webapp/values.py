@@ -85,8 +85,8 @@ def sift(frame: object, server: viser.ViserServer) -> bytes | None:
 def accepted_value(handle: Any, value: object) -> Any | None:
     """`value` as the widget `handle` could have sent it, clamped to its range; None: impossible.
 
-    Wrong types, NaN, infinities, unknown options, texts over MAX_TEXT and numbers above `reach` are
-    impossible.
+    Wrong types, NaN, infinities, unknown options, texts over MAX_TEXT (or what `set_longest` says)
+    and numbers above `reach` are impossible.
     """
     current = handle.value
     if isinstance(current, tuple):
@@ -95,6 +95,11 @@ def accepted_value(handle: Any, value: object) -> Any | None:
         parts = [_accepted_scalar(handle, *pair) for pair in zip(current, value, strict=True)]
         return None if None in parts else tuple(parts)
     return _accepted_scalar(handle, current, value)
+
+
+def set_longest(handle: viser.GuiTextHandle, most: int) -> None:
+    """Accept texts of up to `most` characters from a field."""
+    handle.__dict__["longest"] = most
 
 
 def set_reach(handle: viser.GuiSliderHandle[float], most: float) -> None:
@@ -150,7 +155,8 @@ def _accepted_scalar(handle: Any, current: object, value: object) -> Any | None:
         case str() if options is not None:
             return value if value in options else None
         case str():
-            return value if isinstance(value, str) and len(value) <= MAX_TEXT else None
+            longest = getattr(handle, "longest", MAX_TEXT)
+            return value if isinstance(value, str) and len(value) <= longest else None
     return None
 
 

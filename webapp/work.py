@@ -1,18 +1,19 @@
 """The long work of one tab: linearizing, suggesting thresholds, packing files; one at a time."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from threading import Lock
 
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError
+from photolin.export.maps import Convention
 from photolin.factors import Thresholds
 from photolin.shape.known import Known
 from photolin.shape.recover import recover_shape
 from photolin.shape.resolve import resolve_ambiguity
 
+from .desk import Desk
 from .downloads import (
     REPORT,
     SHAPE,
@@ -24,7 +25,7 @@ from .downloads import (
 from .figure import KINDS as FIGURE_KINDS
 from .figure import make_figure
 from .frame import Recovered
-from .job import Job
+from .job import Job, cancelling
 from .live import is_behind
 from .runs import Runs
 from .source import Source
@@ -32,32 +33,6 @@ from .state import ViewState
 
 EMPTY = "linearize again starts anew"
 """What follows from cancelling the first run."""
-
-
-@dataclass(frozen=True)
-class Desk:
-    """What work needs of its tab; all may be called from any thread."""
-
-    read: Callable[[], ViewState]
-    """The state that all widgets together stand for."""
-    begin: Callable[[Thresholds], None]
-    """Move the sliders to where they start."""
-    move: Callable[[Thresholds], None]
-    """Move the sliders."""
-    busy: Callable[[bool], None]
-    """Show or hide the progress bar."""
-    progress: Callable[[str, float], None]
-    """Show the stage, and the fraction of it that is done."""
-    send: Callable[[str, bytes], None]
-    """Hand a file of that name to the browser."""
-    shaped: Callable[[], None]
-    """A shape was recovered."""
-    tell: Callable[[Exception], None]
-    """Say what went wrong."""
-    refuse: Callable[[], None]
-    """Say that something is running still."""
-    changed: Callable[[], None]
-    """Something is to be drawn anew."""
 
 
 class Work:
@@ -79,6 +54,10 @@ class Work:
         self._declined: frozenset[Method] = frozenset()
         """Methods that were cancelled or failed; not tried again unasked."""
         self._recovered: Recovered | None = None
+        if source.shape is not None and runs.result is not None:  # both are of these images
+            self._recovered = Recovered(source.shape, runs.result)
+        self._waiting: Callable[[], None] | None = None
+        """What is begun once the running work has ended."""
         self._job = Job(self._guarded, desk.changed)
 
     @property
@@ -98,7 +77,8 @@ class Work:
             self._results = {**self._results, method: result}
 
     def stop(self) -> None:
-        """Ask what is running to stop."""
+        """Ask what is running to stop, and begin nothing after it."""
+        self._waiting = None
         self._job.stop()
 
     def close(self) -> None:
@@ -114,10 +94,17 @@ class Work:
         state = self._desk.read()
         self._begin(partial(self._linearize, state.method, state.thresholds))
 
-    def download(self, kind: str, everything: bool, notes: str) -> None:
-        """Send files of what is on screen, see `downloads`; `notes` are part of a report."""
+    def download(
+        self, kind: str, everything: bool, notes: str, convention: Convention = "opengl"
+    ) -> None:
+        """Send files of what is on screen, see `downloads`.
+
+        Args:
+            notes: are part of a report.
+            convention: of the normals' picture, with a shape.
+        """
         if kind == SHAPE:
-            self._begin(self._send_shape)
+            self._begin(partial(self._send_shape, convention))
         else:
             chosen = partial(self._pack, kind, everything)
             if kind == REPORT:
@@ -128,15 +115,17 @@ class Work:
             self._begin(partial(self._send, self._desk.read(), chosen))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
-        """Recover the shape from the result on screen.
+        """Recover the shape from the result on screen, when what is running has ended.
+
+        What waited for that before is not recovered any more.
 
         Args:
             known: of the scene.
             given_lights: whether the stack's own lights are used where `known` says nothing.
             px_mm: side of a pixel, mm.
         """
-        state = self._desk.read()
-        self._begin(partial(self._recover, state, known, given_lights, px_mm))
+        self._waiting = partial(self._recover, known, given_lights, px_mm)
+        self._go_on()
 
     def ensure(self, state: ViewState) -> None:
         """Compute what is to be shown and is not there; the first time with T and Ts suggested."""
@@ -145,6 +134,13 @@ class Work:
         for method in (state.method, state.beside):
             if method is not None and method not in (*self._results, *self._declined):
                 self._job.start(partial(self._linearize, method, thresholds))
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Begin what waits, unless something is running still."""
+        with self._exchange:
+            if self._waiting is not None and self._job.start(self._waiting):
+                self._waiting = None
 
     def _begin(self, work: Callable[[], None]) -> None:
         if not self._job.start(work):
@@ -198,10 +194,8 @@ class Work:
             analysis = self._results[state.method]
         return analysis
 
-    def _recover(
-        self, state: ViewState, known: Known, given_lights: bool, px_mm: float | None
-    ) -> None:
-        analysis = self._settled(state)
+    def _recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
+        analysis = self._settled(self._desk.read())
         self._desk.progress("shape", 0.0)
         earlier = "the earlier one is kept" if self._recovered else "there is none"
         with cancelling("shape", earlier):
@@ -238,20 +232,16 @@ class Work:
         shape = None if found is None else found.shape
         return make_report(shown, runs.stack, shape, command, notes)
 
-    def _send_shape(self) -> None:
+    def _send_shape(self, convention: Convention) -> None:
+        if (found := self._recovered) is None:
+            raise OptionError("there is no shape yet; recover one in the tab Shape (key: N)")
+        analysis, excluded = found.analysis, self._runs.excluded
+        colour = self._source.colour(analysis, excluded, found.shape, self._desk.progress)
         self._desk.progress("writing files", 0.5)
-        self._hand_over(*make_shape_download(self._recovered))
+        result = self._source.pack(analysis, excluded, found.shape)
+        self._hand_over(*make_shape_download(found, result, colour, convention))
 
     def _hand_over(self, name: str, data: bytes) -> None:
         if self._job.stopping():
             raise Cancelled("export cancelled; nothing was saved")
         self._desk.send(name, data)
-
-
-@contextmanager
-def cancelling(what: str, then: str) -> Iterator[None]:
-    """Say in a `Cancelled` what was cancelled and what follows, instead of at which stage."""
-    try:
-        yield
-    except Cancelled as error:
-        raise Cancelled(f"{what} cancelled; {then}") from error

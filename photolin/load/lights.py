@@ -38,10 +38,7 @@ def read_lights(path: Path, names: tuple[str, ...]) -> NDArray[np.float64]:
 
 
 def read_table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
-    """Lines of ``[name] a b c``, after an optional line with their count.
-
-    Returns:
-        The names ("" where a line has none), N of them, and (N,3) finite numbers.
+    """`parse_table` of a file.
 
     Raises:
         InputError: names the file and the line.
@@ -52,18 +49,35 @@ def read_table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: is not text; lines of three numbers are accepted") from error
+    return parse_table(text, str(path))
+
+
+def parse_table(text: str, where: str) -> tuple[list[str], NDArray[np.float64]]:
+    """Lines of ``[name] a b c``, after an optional line with their count.
+
+    Args:
+        where: what the text is called in errors.
+
+    Returns:
+        The names ("" where a line has none), N of them, and (N,3) finite numbers.
+
+    Raises:
+        InputError: names the line.
+    """
     lines = [(n, line.split()) for n, line in enumerate(text.splitlines(), 1)]
     lines = [(n, words) for n, words in lines if words and not words[0].startswith("#")]
     count = None
     if lines and len(lines[0][1]) == 1 and lines[0][1][0].isdecimal():
         count = int(lines.pop(0)[1][0])
     if not lines:
-        raise InputError(f"{path}: holds no lines of three numbers; one for each image is accepted")
+        raise InputError(
+            f"{where}: holds no lines of three numbers; one for each image is accepted"
+        )
     if count is not None and count != len(lines):
         raise InputError(
-            f"{path}: announces {count} lights and lists {len(lines)}; equal numbers are accepted"
+            f"{where}: announces {count} lights and lists {len(lines)}; equal numbers are accepted"
         )
-    rows = [_three_numbers(words, f"{path}, line {n}") for n, words in lines]
+    rows = [_three_numbers(words, f"{where}, line {n}") for n, words in lines]
     return [" ".join(words[:-3]) for _, words in lines], np.array(rows)
 
 

@@ -1,20 +1,23 @@
 """What a user knows of a scene: a sphere, points of known normal, lights of some images."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError, OptionError
-from ..load.lights import read_table
+from ..load.lights import parse_table
 
 FAR = 1e6
 """Rows and columns beyond which nothing is a pixel."""
 UNIT = 1e-3
 """Difference of all lengths from 1 up to which lights are directions without powers."""
 
+POINTS = "lines of row column x y z, or of row column with the option sphere, are accepted"
+LIGHTS = "lines of three numbers are accepted"
+"""What files hold."""
 BOTH = (
     "lights and points or a sphere are known; one of them is accepted, to resolve the ambiguity "
     "of unknown lights"
@@ -88,22 +91,25 @@ def read_known(
     if lights is not None:
         if points is not None:
             raise OptionError(BOTH)
-        images, vectors, powers = _read_some_lights(lights, names)
-        return Known(sphere, images=images, lights=vectors, powers=powers)
+        text = _read_text(lights, LIGHTS)
+        found = lights_in_text(text, names, str(lights), positions=lights.suffix.lower() == ".lp")
+        return replace(found, sphere=sphere)
     if points is None:
         return Known(sphere)
-    pixels, normals = _read_points(points)
-    return Known(sphere, pixels, normals)
+    return points_in_text(_read_text(points, POINTS), str(points), sphere)
 
 
-def _read_points(path: Path) -> tuple[tuple[Point, ...], tuple[Vector, ...]]:
-    accepted = "lines of row column x y z, or of row column with the option sphere, are accepted"
-    try:
-        text = path.read_text("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not text; {accepted}") from error
+def points_in_text(text: str, where: str, sphere: Sphere | None = None) -> Known:
+    """What lines of points say, as in the file `points` of `read_known`.
+
+    Args:
+        where: what the text is called in errors.
+        sphere: that points without normals lie on.
+
+    Raises:
+        InputError: names the line that cannot be used.
+        OptionError: what does not go together, see `Known`.
+    """
     lines = [
         (n, re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")))
         for n, line in enumerate(text.splitlines(), 1)
@@ -112,18 +118,51 @@ def _read_points(path: Path) -> tuple[tuple[Point, ...], tuple[Vector, ...]]:
     if lines and not any(map(_is_number, lines[0][1])):
         del lines[0]
     if not lines:
-        raise InputError(f"{path}: holds no points; {accepted}")
+        raise InputError(f"{where}: holds no points; {POINTS}")
     for n, words in lines:
         if len(words) not in (2, 5) or not all(map(_is_number, words)):
-            raise InputError(f"{path}, line {n}: {' '.join(words)[:60]!r} is no point; {accepted}")
+            raise InputError(f"{where}, line {n}: {' '.join(words)[:60]!r} is no point; {POINTS}")
         if len(words) != len(lines[0][1]):
-            raise InputError(f"{path}, line {n}: some points have normals, others none; {accepted}")
+            raise InputError(f"{where}, line {n}: some points have normals, others none; {POINTS}")
         if any(float(word) % 1 or abs(float(word)) > FAR for word in words[:2]):
-            raise InputError(f"{path}, line {n}: row and column are not whole; {accepted}")
+            raise InputError(f"{where}, line {n}: row and column are not whole; {POINTS}")
     table = [[float(word) for word in words] for _, words in lines]
-    return (
+    return Known(
+        sphere,
         tuple((int(row), int(column)) for row, column, *_ in table),
         tuple((x, y, z) for _, _, x, y, z in table) if len(table[0]) == 5 else (),
+    )
+
+
+def lights_in_text(
+    text: str, names: tuple[str, ...], where: str, *, positions: bool = False
+) -> Known:
+    """What lines of lights say, as in the file `lights` of `read_known`.
+
+    Args:
+        names: of the images, to find those of the lights.
+        where: what the text is called in errors.
+        positions: whether lengths say nothing, as in .lp files.
+
+    Raises:
+        InputError: names the line that cannot be used.
+    """
+    labels, vectors = parse_table(text, where)
+    numbers = {name.lower(): k for k, name in enumerate(names)}
+    images = []
+    for label in labels:
+        name = label.replace("\\", "/").rsplit("/", 1)[-1].lower()
+        if name not in numbers:
+            raise InputError(
+                f"{where}: {label or 'a line without a name'!r} is no image of the stack; names "
+                f"such as {names[0]} before x y z are accepted"
+            )
+        images.append(numbers[name])
+    lengths = np.linalg.norm(vectors, axis=1)
+    return Known(
+        images=tuple(images),
+        lights=tuple((x, y, z) for x, y, z in vectors.tolist()),
+        powers=not positions and bool((np.abs(lengths - 1) > UNIT).any()),
     )
 
 
@@ -134,22 +173,10 @@ def _is_number(word: str) -> bool:
         return False
 
 
-def _read_some_lights(
-    path: Path, names: tuple[str, ...]
-) -> tuple[tuple[int, ...], tuple[Vector, ...], bool]:
-    labels, vectors = read_table(path)
-    numbers = {name.lower(): k for k, name in enumerate(names)}
-    images = []
-    for label in labels:
-        name = label.replace("\\", "/").rsplit("/", 1)[-1].lower()
-        if name not in numbers:
-            raise InputError(
-                f"{path}: {label or 'a line without a name'!r} is no image of the stack; names "
-                f"such as {names[0]} before x y z are accepted"
-            )
-        images.append(numbers[name])
-    if path.suffix.lower() == ".lp":
-        powers = False
-    else:
-        powers = bool((np.abs(np.linalg.norm(vectors, axis=1) - 1) > UNIT).any())
-    return tuple(images), tuple((x, y, z) for x, y, z in vectors.tolist()), powers
+def _read_text(path: Path, accepted: str) -> str:
+    try:
+        return path.read_text("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not text; {accepted}") from error

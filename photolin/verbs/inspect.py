@@ -10,7 +10,13 @@ from tyro.conf import Positional
 from ..analysis import Options
 from ..console import progress_bar
 from ..errors import InputError
-from ..export import is_result, load_result, load_result_source, load_result_stack
+from ..export import (
+    is_result,
+    load_result,
+    load_result_source,
+    load_result_stack,
+    load_shape,
+)
 from ..load import LoadOptions
 from ..stack import ImageStack
 from ..synthetic import load_truth
@@ -29,7 +35,8 @@ def inspect(
 ) -> None:
     """Look at a stack or a result in the browser.
 
-    A result brings its own analysis and reading options; those given apply to a stack. What is set
+    A result brings its own analysis and reading options, and the shape that was recovered from it;
+    those given apply to a stack. What is set
     there is kept in photolin_session.json, beside the result or the images, for the next time.
 
     Args:
@@ -40,8 +47,11 @@ def inspect(
         no_browser: Print the address and do not open a browser.
     """
     result = load_result(path) if is_result(path) else None
-    images, place = None, path
+    images, place, found = None, path, None
     if result is not None:
+        found = load_shape(path)
+        if found is not None and found.depth is None:  # of a run, which nobody asked for a shape
+            found = None
         images = load_result_stack(path, stack)
         was, reading = load_result_source(path)
         path = stack or was or path
@@ -60,6 +70,7 @@ def inspect(
         saved_place(place),
         reading,
         find_truth(path, images, reading),
+        found,
     )
     serve(source, host=host, port=port, open_browser=not no_browser)
 

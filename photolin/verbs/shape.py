@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from tyro.conf import Positional
 
 from ..analysis import Analysis, Cancel, Options, Progress
@@ -25,9 +24,9 @@ from ..export import (
 )
 from ..export.lights import lights_diligent, lights_lp
 from ..export.surface import surface_files
-from ..load import LoadOptions, load_channels
+from ..load import LoadOptions
 from ..pipeline import analyze
-from ..shape.colour import colour_albedo
+from ..shape.channels import measure_colour
 from ..shape.known import Sphere, read_known
 from ..shape.recover import Shape, check_scale, recover_shape
 from ..shape.resolve import NOTHING, Known, resolve_ambiguity
@@ -172,24 +171,6 @@ def measure_shape(
     total = analysis.seconds["total"] - analysis.seconds.get("shape", 0) + seconds
     took = {**stages, "shape": seconds, "total": total}
     return replace(analysis, seconds=took), found
-
-
-def measure_colour(
-    path: Path, reading: LoadOptions, analysis: Analysis, found: Shape, progress: Progress
-) -> NDArray[np.float32] | None:
-    """Albedo (H,W,3) of a colour stack, gray where no observation is D; None where the images are
-    gray or arrays."""
-    try:
-        channels = load_channels(path, reading, progress)
-        planes = [
-            colour_albedo(found.normals, found.lights, analysis.labels, each.images, each.white)
-            for each in channels
-        ]
-    except InputError:
-        return None
-    colour = np.stack(planes, axis=2)
-    # where no observation is D, as in dark creases, nothing tells the colour
-    return np.where(np.isnan(colour).any(axis=2, keepdims=True), found.albedo[..., None], colour)
 
 
 def lights(

@@ -48,6 +48,7 @@ window.openCanvas = (options) => {
   const relief = openRelief(page);
   const marks = openMarks({ ...page, camera, relief });
   const light = openLight(page);
+  const sketch = openSketch({ ...page, camera });
   const widgets = openWidgets(page);
   const compare = openCompare({ ...page, camera });
   const band = openBand({ ...page, camera });
@@ -78,6 +79,7 @@ window.openCanvas = (options) => {
     );
     compare.draw();
     band.draw();
+    sketch.draw();
     marks.draw();
     tellView();
   }
@@ -170,6 +172,7 @@ window.openCanvas = (options) => {
     setOrbit: camera.setOrbit,
     setMarks: marks.setMarks,
     setLight: light.setLight,
+    setSketch: sketch.setSketch,
     setComparison: compare.set,
     setReadout: marks.setReadout,
     setReach: widgets.setReach,

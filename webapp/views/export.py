@@ -4,12 +4,14 @@ from collections.abc import Callable
 
 import viser
 
+from photolin.export.maps import Convention
+
 from ..downloads import REPORT, SHAPE
 from ..figure import KINDS as FIGURES
 from ..values import choose_option
 
 RESULT = "result (npz and json, zip)"
-SURFACE = "shape (normals, albedo, depth, mesh, lights; zip)"
+SURFACE = "shape (maps and mesh, zip)"
 PAGE = "report (one web page to send)"
 KINDS = {
     "masks (PNG, zip)": "masks",
@@ -33,8 +35,9 @@ TEXT = """
 - **report**: pictures, shares, settings, your notes and the command that makes the result again,
   as a single page that needs no network
 - **shape**: what `photolin shape` writes, once the tab Shape has recovered one. normals.tif,
-  albedo.tif and depth.tif are numbers, the PNGs to look at; mesh.ply and mesh.obj open in MeshLab
-  or Blender; lights.lp is for RTI. x is right, y up, z to the camera
+  albedo.tif (in colour where the images are) and depth.tif are numbers, the PNGs to look at;
+  mesh.ply and mesh.obj open in MeshLab or Blender; lights.lp is for RTI. x is right, y up, z to the
+  camera. The result is in it too
 - **figures**: of this stack, as in Mukaigawa et al. 2007. 6: label maps of this image by all
   methods, and the truth where it is known. 8: base images as photographed, and linearized by all
   methods; 15: linearized only. 10: this image, linearized, and where each class is, in black; 11:
@@ -59,16 +62,24 @@ class ExportView:
         self._images = gui.add_dropdown(
             "Of", (THIS, ALL), hint="Result, report, shape and figures decide by themselves"
         )
+        self._directx = gui.add_checkbox(
+            "DirectX normals", False, visible=False, hint="Green is y down; else y up, as in OpenGL"
+        )
         self._button = gui.add_button("Download", icon=viser.Icon.DOWNLOAD, hint="Key: E")
         add_progress(gui)
 
         @self._kind.on_update
         async def _(_: viser.GuiEvent) -> None:
+            self._directx.visible = self._kind.value == SURFACE
             self._images.disabled = self.chosen()[0] in FIXED
 
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:
             export(*self.chosen())
+
+    def convention(self) -> Convention:
+        """Of the picture of normals."""
+        return "directx" if self._directx.value is True else "opengl"
 
     def explain(self, gui: viser.GuiApi) -> None:
         """Say what the files hold; long, and so below all else of the tab."""

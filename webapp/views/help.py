@@ -22,8 +22,9 @@ image, a click on its corner leaves it out or takes it in again; then all is lin
 view *how often* shows in how many images each pixel is specular, lit or in shadow.
 
 The tab *Shape* goes on from there, to the surface and to the lights. It takes what is known of the
-scene: the lights, five points on a sphere, a whole sphere, or nothing; a click on *Recover shape*
-gives normals, albedo and depth, and the views *albedo*, *normals*, *depth* and *relit*. *relit* is
+scene: the lights, or those of some images; five points on a sphere, a whole sphere, or normals of
+some pixels; or nothing. A click on *Recover shape* gives normals, albedo and depth, and the views
+*albedo*, *normals*, *depth* and *relit*. *relit* is
 the scene under a light of your own: drag the yellow spot on the ball in the corner, its middle is
 light from the camera and its rim light from the side. *3D* lays the picture on the surface.
 

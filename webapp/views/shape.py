@@ -1,36 +1,54 @@
 """From the linearized images to a surface: what is known of the scene, and how it is looked at."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
 
-import numpy as np
 import viser
 
-from photolin.errors import PhotolinError
-from photolin.shape.circle import fit_circle
-from photolin.shape.known import Known, Sphere
+from photolin.errors import OptionError
+from photolin.shape.known import Known, Sphere, lights_in_text, points_in_text
+from photolin.shape.resolved import Kind, Resolved
 from photolin.stack import ImageStack
 
 from ..frame import Frame
 from ..live import is_behind
-from ..readout import describe_shape, escape, shape_status
+from ..pointed import FIRST, ON, RIM
+from ..readout import describe_shape, doubt_shape, escape, shape_status
+from ..sketch import Sketch
 from ..state import Pixel, ViewState
-from ..values import choose_option, clamp_number
+from ..values import choose_option, clamp_number, set_longest
 from . import ATTENTION, INDENT
+from .sphere import LARGEST, SphereView
 
-LIGHTS, POINTS, BALL, NOTHING = (
+LIGHTS, POINTS, BALL, NORMALS, SOME, NOTHING = (
     "the lights of the stack",
     "points on a sphere",
     "a whole sphere",
+    "normals of some pixels",
+    "lights of some images",
     "nothing",
 )
+LISTS = {
+    NORMALS: "Lines of row column x y z: a pixel, its unit normal. x right, y up, z to the camera.",
+    SOME: "Lines of name x y z: an image, its light. x right, y up, z to the camera.",
+}
+"""Kinds that are told by lines of text, and what those hold."""
+KINDS: dict[Kind, str] = {
+    "lights": LIGHTS,
+    "points": POINTS,
+    "sphere": BALL,
+    "some lights": SOME,
+    "integrability": NOTHING,
+}
+"""What was known, by how a shape was resolved."""
 NO_SHAPE = "No shape yet. Say what is known of the scene, then recover it."
-ENOUGH = 5
-"""Points from which the shape is recovered at once: the paper's number."""
-RIM, ON, SELECT, CLEAR = "outline", "points", "select", "clear"
-Picking = Literal["outline", "points"]
-LARGEST = 1e5
+MANY = 30
+"""Lights from which on they are not drawn unless asked for."""
+ID = "photolin-shape"
+"""Of what is there while the panel is in view."""
+LONGEST = 200_000
+"""Characters of a list."""
 
 
 class ShapeView:
@@ -42,101 +60,63 @@ class ShapeView:
         stack: ImageStack,
         changed: Callable[[], None],
         recover: Callable[[], None],
+        retract: Callable[[], None],
+        show: Callable[[Sketch | None], None],
     ) -> None:
-        self._changed, self._recover = changed, recover
-        self._picking: Picking | None = None
-        self._rim: tuple[Pixel, ...] = ()
-        self._points: tuple[Pixel, ...] = ()
-        kinds = (POINTS, BALL, NOTHING) if stack.lights is None else (LIGHTS, POINTS, BALL, NOTHING)
+        """Build it; `retract` and `show` as `SphereView` takes them."""
+        self._names = stack.names
+        kinds = (POINTS, BALL, NORMALS, SOME, NOTHING)
         self._known = gui.add_dropdown(
             "Known",
-            kinds,
+            kinds if stack.lights is None else (LIGHTS, *kinds),
             initial_value=NOTHING if stack.lights is None else LIGHTS,
-            hint="With unknown lights, normals are known up to a 3x3 matrix. It is resolved by "
-            "points on a sphere that you click (five or more), by all pixels of a sphere, or by "
-            "nothing but that normals belong to a surface: then tilt and relief are a convention",
+            hint="What tells tilt and relief of the surface. With nothing, they are a convention",
         )
-        row, column, radius = outline_of(stack)
-        self._numbers = tuple(
-            gui.add_number(name, round(value, 1), min=low, max=LARGEST, step=0.1, hint=hint)
-            for name, value, low, hint in (
-                ("Centre row", row, -LARGEST, "Of the sphere's outline, pixels from the top"),
-                ("Centre column", column, -LARGEST, "Of the sphere's outline, pixels from left"),
-                ("Radius", radius, 0.5, "Of the sphere's outline, pixels"),
-            )
-        )
-        self._pick = gui.add_button_group(
-            "Click on picture",
-            (RIM, ON, SELECT, CLEAR),
-            hint="outline: three clicks or more on the sphere's rim set centre and radius. points: "
-            "clicks on the sphere; from the fifth on, the shape is recovered at once. select: "
-            "clicks select pixels again. clear: forget what was clicked",
-        )
+        self._sphere = SphereView(gui, stack, recover, retract, show)
         self._told = gui.add_html("")
+        self._list = gui.add_text("List", "", multiline=True, hint="Paste the lines of a file")
+        set_longest(self._list, LONGEST)
         self._px_mm = gui.add_number(
             "Pixel, mm",
             0.0,
             min=0.0,
             max=LARGEST,
             step=0.001,
-            hint="Side of a pixel on the object; depth and mesh are in mm then. 0: in pixels",
+            hint="Side of a pixel on the object, for lengths in mm. 0: in pixels",
         )
-        self._button = gui.add_button(
-            "Recover shape",
-            icon=viser.Icon.CUBE,
-            hint="Normals, albedo and depth from the linearized images (key: N)",
-        )
-        self._note = gui.add_html("")
-        self._relief = gui.add_checkbox(
-            "3D",
-            False,
-            hint="Lay the picture on the surface: drag turns, right-drag moves, wheel zooms, a "
-            "click selects the pixel (key: D)",
-        )
+        self._button = gui.add_button("Recover shape", icon=viser.Icon.CUBE, hint="Key: N")
+        self._note = gui.add_html(f'<div id="{ID}"></div>')
+        self._relief = gui.add_checkbox("3D", False, hint="Key: D")
         self._arrows = gui.add_checkbox(
-            "lights", True, hint="Arrows from the lights, orange for the image shown (only in 3D)"
+            "lights", len(stack.images) <= MANY, hint="In 3D, as arrows; orange: of this image"
         )
+        self._bind(changed, recover)
+        self._arrange()
+
+    def _bind(self, changed: Callable[[], None], recover: Callable[[], None]) -> None:
         for handle in (self._relief, self._arrows):
             handle.disabled = True  # until there is a shape
 
             @handle.on_update
             async def _(_: viser.GuiEvent) -> None:
+                self._sphere.see(flat=not self._relief.value)
                 changed()
 
         @self._known.on_update
         async def _(_: viser.GuiEvent) -> None:
             self._arrange()
 
-        @self._pick.on_click
-        async def _(_: viser.GuiEvent) -> None:
-            self._begin(self._pick.value)
-
         @self._button.on_click
         async def _(_: viser.GuiEvent) -> None:
             recover()
 
-        self._arrange()
-
-    @property
-    def marks(self) -> tuple[tuple[int, int, str], ...]:
-        """(row, column, text) of what was clicked."""
-        rim = tuple((*pixel, "rim") for pixel in self._rim)
-        return (*rim, *((*pixel, str(n)) for n, pixel in enumerate(self._points, 1)))
+    def see(self, shown: bool) -> None:
+        """Whether the panel is in view: else clicks are not for it."""
+        self._sphere.see(in_view=shown)
 
     def take(self, pixel: Pixel) -> bool:
-        """Take a click while outline or points are being clicked; whether it was taken."""
-        if self._picking == RIM:
-            self._rim = (*self._rim, pixel)
-            self._set_outline()
-        elif self._picking == ON:
-            self._points = (*self._points, pixel)
-        else:
-            return False
-        self._tell()
-        self._changed()
-        if self._picking == ON and len(self._points) >= ENOUGH:
-            self._recover()
-        return True
+        """Take a click on the picture where the sphere is pointed out; whether it was taken."""
+        return self._sphere.take(pixel)
 
     def toggle(self) -> None:
         """Flat or 3D, once there is a shape."""
@@ -147,12 +127,20 @@ class ShapeView:
         """What is known of the scene, as set here.
 
         Raises:
-            OptionError: it does not go together.
+            OptionError: it does not go together, or the outline of a sphere is not set.
+            InputError: a list cannot be read.
         """
         kind = choose_option(self._known.value, self._known.options, NOTHING)
-        if kind == POINTS:
-            return Known(self._outline(), self._points)
-        return Known(self._outline()) if kind == BALL else Known()
+        if kind == NORMALS:
+            return points_in_text(str(self._list.value), "the list")
+        if kind == SOME:
+            return lights_in_text(str(self._list.value), self._names, "the list")
+        if kind not in (POINTS, BALL):
+            return Known()
+        pointed = self._sphere.pointed
+        if pointed.guessed:
+            raise OptionError(f"the outline of the sphere is not set. {FIRST}")
+        return Known(pointed.outline, pointed.points if kind == POINTS else ())
 
     def given_lights(self) -> bool:
         """Whether the lights of the stack are to be used."""
@@ -162,6 +150,16 @@ class ShapeView:
         """Side of a pixel, mm; None where unknown."""
         value = clamp_number(self._px_mm.value, 0, LARGEST, 0.0)
         return value if value > 0 else None
+
+    def recall(self, resolved: Resolved, px_mm: float | None) -> None:
+        """Set what was known when a shape was recovered, as far as the shape tells."""
+        kind = KINDS[resolved.kind]
+        if (outline := outline_in_note(resolved)) is not None:
+            self._sphere.set(outline)
+        if kind in self._known.options:
+            self._known.value = kind
+        self._px_mm.value = px_mm or 0.0
+        self._arrange()
 
     def restore(self, state: ViewState) -> None:
         """Set the lights of a state; 3D waits for a shape."""
@@ -173,53 +171,28 @@ class ShapeView:
 
     def draw(self, frame: Frame) -> None:
         """Say how the shape was found."""
-        text = NO_SHAPE if frame.shape is None else describe_shape(frame.shape)
+        self._names = frame.stack.names
+        self._sphere.draw(frame)
+        found = frame.shape
+        text = NO_SHAPE if found is None else describe_shape(found)
         note = f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
-        if stale := status_of(frame):
-            note = (
-                '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
-                f'{ATTENTION}">{escape(stale)}</div>{note}'
-            )
-        self._note.content = note
+        doubt = "" if found is None else doubt_shape(found)
+        attention = "".join(
+            '<div style="margin:0 var(--mantine-spacing-xs) 0.5em;font-size:0.8em;'
+            f'{ATTENTION}">{escape(sentence)}</div>'
+            for sentence in (doubt, status_of(frame))
+            if sentence
+        )
+        self._note.content = f'<div id="{ID}">{attention}{note}</div>'
         for handle in (self._relief, self._arrows):
-            handle.disabled = frame.shape is None
-
-    def _outline(self) -> Sphere:
-        row, column, radius = (clamp_number(n.value, -LARGEST, LARGEST, 1.0) for n in self._numbers)
-        return row, column, max(radius, 0.5)
-
-    def _set_outline(self) -> None:
-        try:
-            centre, radius = fit_circle(*np.array(self._rim, float).T)
-        except PhotolinError:  # too few clicks yet, or on a line
-            return
-        for handle, value in zip(self._numbers, (*centre, radius), strict=True):
-            handle.value = round(value, 1)
-
-    def _begin(self, what: str) -> None:
-        if what == CLEAR:
-            self._rim, self._points = (), ()
-        self._picking = what if what in (RIM, ON) else None
-        self._tell()
-        self._changed()
+            handle.disabled = found is None
 
     def _arrange(self) -> None:
-        sphere = self._known.value in (POINTS, BALL)
-        for handle in (*self._numbers, self._pick, self._told):
-            handle.visible = sphere
-        if not sphere:
-            self._picking = None
-        self._tell()
-
-    def _tell(self) -> None:
-        count = len(self._points)
-        text = {
-            None: "Clicks select pixels.",
-            RIM: f"Click the sphere's rim, three times or more: {len(self._rim)} so far.",
-            ON: f"Click points on the sphere, {ENOUGH} or more, spread wide: {count} so far.",
-        }[self._picking]
+        kind = choose_option(self._known.value, self._known.options, NOTHING)
+        self._sphere.want(ON if kind == POINTS else RIM if kind == BALL else None)
+        self._told.visible = self._list.visible = kind in LISTS
         self._told.content = (
-            f'<div style="{INDENT};font-size:0.8em;margin-bottom:0.6em">{escape(text)}</div>'
+            f'<div style="{INDENT};font-size:0.8em">{escape(LISTS.get(kind, ""))}</div>'
         )
 
 
@@ -233,7 +206,9 @@ def status_of(frame: Frame) -> str:
     return shape_status(frame.recovered.analysis, shown, wanted)
 
 
-def outline_of(stack: ImageStack) -> Sphere:
-    """Centre row, column and radius of the circle with the centre and the area of the mask."""
-    rows, columns = np.divmod(stack.pixels, stack.shape[2])
-    return float(rows.mean()), float(columns.mean()), float(np.sqrt(len(rows) / np.pi))
+def outline_in_note(resolved: Resolved) -> Sphere | None:
+    """The outline of the sphere that resolved a shape, from the sentence that tells it."""
+    number = r"(-?[0-9.]+(?:e[+-]?[0-9]+)?)"
+    text = f"sphere at row {number}, column {number}, radius {number} pixels"
+    found = re.search(text, resolved.note) if resolved.kind == "sphere" else None
+    return None if found is None else (float(found[1]), float(found[2]), float(found[3]))
