@@ -493,7 +493,7 @@ def test_classes_are_switched_and_outlined(page: Any, app: App) -> None:
     below = np.repeat(picture(0)[..., None], 3, axis=2)
     expected = np.where(cast[..., None], below, painted(RESULT.labels[0]))
     wait_for_colours(page, expected)
-    press(page, "4", "ArrowDown")
+    press(page, "4", "ArrowDown", "ArrowDown")
     widget(page, session._panels.legend._switches[Factor.SPECULAR]).click()
     widget(page, session._panels.legend._outlines).click()
     look = {"shown": frozenset(Factor) - {Factor.SPECULAR}, "outlines": True}
