@@ -236,7 +236,7 @@ def test_labels_on_screen_follow_T_moved_by_keyboard(page: Any, app: App) -> Non
     few = labels_at(session)
     assert np.count_nonzero(few != RESULT.labels[0]) > 20
     wait_for_colours(page, blended(picture(0), few), tolerance=1)
-    press(page, "]", "}", "}", "{", "ArrowUp")  # up from the first layer: round to the label map
+    press(page, "]", "}", "}", "{", "ArrowUp", "ArrowUp")  # round to the label map
     wait_until(lambda: session._read().layer == "labels")
     wait_for_colours(page, painted(labels_at(session)))
     assert number(page, T) == pytest.approx(T.value, abs=1e-9)
@@ -247,7 +247,7 @@ def test_after_dragging_T_the_last_value_wins_everywhere(page: Any, app: App) ->
     T = session._panels.thresholds._T
     click_pixel(page, 30, 20)
     wait_until(lambda: session._pointing.pixel == (30, 20))
-    press(page, "ArrowUp")
+    press(page, "ArrowUp", "ArrowUp")
     track = widget(page, T).bounding_box()
     middle = track["y"] + thumb(page, T).bounding_box()["height"] / 2
     knob = thumb(page, T).bounding_box()
@@ -485,7 +485,7 @@ def test_images_and_layers_are_the_stack_and_the_backend(page: Any, app: App) ->
 
 def test_classes_are_switched_and_outlined(page: Any, app: App) -> None:
     session = enter(page, app)
-    press(page, "4", "ArrowUp")
+    press(page, "4", "ArrowUp", "ArrowUp")
     shown = frozenset(Factor) - {Factor.CAST}
     wait_until(lambda: session._read().shown == shown)
     cast = RESULT.labels[0] == Factor.CAST
@@ -493,7 +493,7 @@ def test_classes_are_switched_and_outlined(page: Any, app: App) -> None:
     below = np.repeat(picture(0)[..., None], 3, axis=2)
     expected = np.where(cast[..., None], below, painted(RESULT.labels[0]))
     wait_for_colours(page, expected)
-    press(page, "4", "ArrowDown")
+    press(page, "4", "ArrowDown", "ArrowDown")
     widget(page, session._panels.legend._switches[Factor.SPECULAR]).click()
     widget(page, session._panels.legend._outlines).click()
     look = {"shown": frozenset(Factor) - {Factor.SPECULAR}, "outlines": True}
@@ -615,7 +615,7 @@ def test_a_number_being_typed_has_its_keys_and_tab_goes_from_widget_to_widget(
 
 def test_two_tabs_share_nothing_and_a_closed_one_is_freed(page: Any, app: App) -> None:
     first = enter(page, app)
-    press(page, "ArrowUp")
+    press(page, "ArrowUp", "ArrowUp")
     wait_for_colours(page, painted(RESULT.labels[0]))
     other = page.context.new_page()
     gone = change_everything(other, app)
@@ -668,7 +668,7 @@ def test_closing_a_tab_ends_its_run(page: Any, open_app: OpenApp, gate: Gate) ->
 
 def test_hostile_values_change_no_other_tab(page: Any, app: App) -> None:
     session = enter(page, app)
-    press(page, "ArrowUp")
+    press(page, "ArrowUp", "ArrowUp")
     expected = painted(RESULT.labels[0])
     wait_for_colours(page, expected)
     T = session._panels.thresholds._T

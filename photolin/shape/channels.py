@@ -15,7 +15,8 @@ from .recover import Shape
 def measure_colour(
     path: Path, reading: LoadOptions, analysis: Analysis, found: Shape, progress: Progress
 ) -> NDArray[np.float32] | None:
-    """Albedo (H,W,3) of a colour stack, gray where no observation is D; None for gray or arrays.
+    """Albedo (H,W,3) of a colour stack, gray where no observation is D; None where the images are
+    gray or arrays.
 
     Args:
         path: of the stack.
