@@ -63,7 +63,9 @@ class OverviewView:
             hint="The view how often shows in how many images each pixel is so, by T and Ts as "
             "they stand. lit: diffuse or specular",
         )
-        self._views = gui.add_button_group(" ", (SHOW, BACK))
+        self._views = gui.add_button_group(
+            " ", (SHOW, BACK), hint="The view how often in the tab Tune, and the view input"
+        )
         self._order = gui.add_dropdown(
             "Order", ORDERS, initial_value=ORDERS[0], hint="worst first: with the most findings"
         )

@@ -50,6 +50,8 @@ ID = "photolin-shape"
 LONGEST = 200_000
 """Characters of a list."""
 
+RECOVER = "Normals, albedo and depth from the linearized images (key: N)"
+
 
 class ShapeView:
     """What is known, what was clicked, and the switches of the 3D view."""
@@ -84,9 +86,11 @@ class ShapeView:
             step=0.001,
             hint="Side of a pixel on the object, for lengths in mm. 0: in pixels",
         )
-        self._button = gui.add_button("Recover shape", icon=viser.Icon.CUBE, hint="Key: N")
+        self._button = gui.add_button("Recover shape", icon=viser.Icon.CUBE, hint=RECOVER)
         self._note = gui.add_html(f'<div id="{ID}"></div>')
-        self._relief = gui.add_checkbox("3D", False, hint="Key: D")
+        self._relief = gui.add_checkbox(
+            "3D", False, hint="The picture on the surface: drag turns it (key: D)"
+        )
         self._arrows = gui.add_checkbox(
             "lights", len(stack.images) <= MANY, hint="In 3D, as arrows; orange: of this image"
         )
