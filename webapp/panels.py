@@ -54,8 +54,8 @@ class Actions:
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
     """Take all pins away."""
-    exclude: Callable[[int], None]
-    """Leave an image of the whole stack out, or take it in again."""
+    exclude: Callable[[int, bool], None]
+    """Leave an image of the whole stack out, or where false take it in again."""
     copy: Callable[[], None]
     """Copy the command that makes what is shown."""
     tell: Callable[[Exception], None]

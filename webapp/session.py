@@ -26,7 +26,7 @@ from .painter import Painter
 from .panels import Actions, Panels
 from .pointing import Pointing
 from .saved import Saved
-from .selections import Selections
+from .selections import Selections, follow_image
 from .state import SURFACE, Pixel, ViewState
 from .theme import set_theme
 from .work import Desk
@@ -174,9 +174,10 @@ class Session:
     def _download(self, kind: str, everything: bool) -> None:
         self._bench.work.download(kind, everything, self._panels.notes.read())
 
-    def _exclude(self, image: int) -> None:
+    def _exclude(self, image: int, out: bool = True) -> None:
         """Leave an image of the whole stack out, or take it in again."""
-        self._excluded = tuple(sorted({*self._excluded} ^ {image}))
+        others = {*self._excluded} - {image}
+        self._excluded = tuple(sorted(others | {image} if out else others))
         self._wake.set()
 
     def _copy(self) -> None:
@@ -263,11 +264,9 @@ class Session:
             self._excluded = before
             self.notices.tell(error)
             return
-        count = len(self._source.stack.images)
-        left = [k for k in range(count) if k not in before]
-        now = [k for k in range(count) if k not in self._bench.runs.excluded]
-        image = next((n for n, k in enumerate(now) if k >= left[shown]), len(now) - 1)
-        self._panels.picture.restock(len(now), image)
+        runs = self._bench.runs
+        image = follow_image(len(self._source.stack.images), shown, before, runs.excluded)
+        self._panels.picture.restock(len(runs.stack.images), image)
 
     def _keep(self, state: ViewState, rested: bool) -> bool:
         """Keep the session once it rests; whether that is still to come.
