@@ -24,6 +24,10 @@ class Wishes:
         (self.out.add if out else self.out.discard)(image)
 
 
+def refuse(error: Exception) -> None:
+    raise error
+
+
 @pytest.fixture
 def wishes() -> Wishes:
     return Wishes()
@@ -33,7 +37,7 @@ def wishes() -> Wishes:
 def view(wishes: Wishes) -> Iterator[OverviewView]:
     made = OverviewView(
         *(MagicMock(), MagicMock(), STACK, MagicMock()),
-        *(lambda: None, wishes.exclude, pytest.fail),
+        *(lambda: None, wishes.exclude, refuse),
     )
     made.draw(compose(Runs(STACK, MagicMock()), {}, ViewState(image=3)))
     yield made
