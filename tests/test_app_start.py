@@ -1,4 +1,4 @@
-"""What a server does with exclusions that cannot be, before and when a tab is opened."""
+"""Tabs without a picture: how they begin, with exclusions that cannot be too, and how they end."""
 
 import threading
 from collections.abc import Iterator
@@ -17,12 +17,13 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from photolin.analysis import Options
-from photolin.errors import OptionError
+from photolin.errors import Cancelled, OptionError
 from photolin.load import LoadOptions
 from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp.app import App
-from webapp.saved import Saved, encode_saved
+from webapp.runs import Runs
+from webapp.saved import Saved, decode_saved, encode_saved
 from webapp.session import Session
 from webapp.source import Source
 from webapp.viser_internals import SUBPROTOCOL
@@ -80,5 +81,58 @@ def test_a_session_whose_exclusions_cannot_be_any_more_opens_without_them(tmp_pa
         with open_tab(app) as session:
             assert session._bench.runs.excluded == ()
             assert session._panels.notes.read() == "mine"
+    finally:
+        app.stop()
+
+
+def rested(session: Session) -> bool:
+    """Whether the tab knows what it shows, and has kept it."""
+    return session._saved is not None and session._saved.state == session._read()
+
+
+def test_what_is_done_just_before_a_tab_is_closed_is_kept() -> None:
+    app = App(Source(STACK, None, OPTIONS), port=0)
+    try:
+        with open_tab(app) as session:
+            wait_until(lambda: rested(session), 60)
+            session._panels.press("]")
+            session._panels.notes._notes.value = "the last word"
+            last = session._read()
+        wait_until(lambda: app._keeper.latest is not None)
+        assert app._keeper.latest == Saved(last, (), "the last word")
+    finally:
+        app.stop()
+
+
+def test_what_is_done_just_before_the_end_is_in_the_file(tmp_path: Path) -> None:
+    place = tmp_path / "session.json"
+    app = App(Source(STACK, None, OPTIONS, place=place), port=0)
+    with open_tab(app) as session:
+        wait_until(lambda: rested(session), 60)
+        session._panels.press("]")
+        last = session._read()
+        app.stop()
+    assert decode_saved(place.read_bytes(), STACK.shape)[0].state == last
+
+
+def test_what_is_left_out_is_kept_though_its_run_is_cancelled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = App(Source(STACK, None, OPTIONS), port=0)
+    try:
+        with open_tab(app) as session:
+            wait_until(lambda: rested(session), 60)
+
+            def cancel(*asked: object) -> None:
+                raise Cancelled("as asked")
+
+            monkeypatch.setattr(Runs, "run", cancel)
+            session._exclude(3)
+            wait_until(lambda: session._bench.runs.excluded == (3,))
+            session._panels.notes._notes.value = "image 3 is blurred"
+            wait_until(lambda: app._keeper.latest is not None)
+            assert app._keeper.latest is not None
+            wait_until(lambda: "blurred" in getattr(app._keeper.latest, "notes", ""))
+            assert app._keeper.latest.exclusions == (3,)
     finally:
         app.stop()

@@ -47,6 +47,8 @@ class App:
             self._sessions.clear()
         for session in sessions:
             session.close()
+        for session in sessions:
+            session.wait()
         self._keeper.close()
         self.server.stop()
 
