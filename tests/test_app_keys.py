@@ -42,6 +42,10 @@ def enter(page: Any, app: App) -> Session:
     return session
 
 
+def threshold(session: Session) -> float:
+    return session._read().T
+
+
 def test_a_key_that_is_held_steps_through_images_but_leaves_out_one(page: Any, app: App) -> None:
     session = enter(page, app)
     for key in ("ArrowRight", "K", "k"):
@@ -56,14 +60,14 @@ def test_a_key_that_is_held_steps_through_images_but_leaves_out_one(page: Any, a
 
 def test_brackets_that_take_AltGr_are_brackets_and_chords_are_none(page: Any, app: App) -> None:
     session = enter(page, app)
-    before = session._read().T
+    first = threshold(session)
     send = "(options) => document.body.dispatchEvent(new KeyboardEvent('keydown', options))"
     chord = {"key": "]", "ctrlKey": True, "altKey": True, "bubbles": True}
     page.evaluate(send, chord)
     page.wait_for_timeout(300)
-    assert session._read().T == before
+    assert threshold(session) == first
     page.evaluate(send, chord | {"modifierAltGraph": True})
-    wait_until(lambda: session._read().T > before)
+    wait_until(lambda: threshold(session) > first)
 
 
 def test_the_command_is_copied_where_a_page_has_no_clipboard_of_its_own(

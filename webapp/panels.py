@@ -166,6 +166,7 @@ class Panels:
     def redraw(self) -> None:
         """Show what changed in panels without a change of the state."""
         self.samples.redraw()
+        self.compare.redraw()
 
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""
