@@ -129,7 +129,7 @@ def test_an_image_is_left_out_and_taken_in_again(
     assert np.array_equal(left.labels, expected.labels)
     assert session._read().image == 3  # the one that followed
     page.get_by_text("004.png").wait_for()
-    session._exclude(3)
+    session._exclude(3, False)
     page.get_by_text("8 images, 48").wait_for()
     page.get_by_text("004.png").wait_for()  # still the same
     assert session._bench.work.results["robust"] is whole

@@ -10,6 +10,7 @@ from PIL import Image
 
 from photolin.analysis import Options
 from photolin.factors import PALETTE, Factor
+from photolin.load.exclude import exclude_images
 from photolin.overview import count_classes
 from photolin.pipeline import analyze
 from photolin.shape.recover import Shape, recover_shape
@@ -397,6 +398,18 @@ def test_true_labels_take_the_place_of_computed_ones_and_the_pointer_reads_both(
     draw(against="residual")
     left, right = canvas.readout.split("\n")
     assert left.removeprefix("left:  ") == right.removeprefix("right: ")
+
+
+def test_true_labels_are_drawn_anew_when_another_image_takes_the_number_of_one_left_out(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    truth = np.arange(8, dtype=np.uint8)[:, None, None] % 5 + np.zeros(STACK.shape, np.uint8)
+    state = ViewState(image=3, T=0.05, Ts=0.02, against="truth")
+    painter.paint(compose(Runs(STACK, Options(), truth=truth), {}, state), None, rested=True)
+    assert (canvas.take()["other overlay"] == (*PALETTE[Factor(3)], 255)).all()
+    runs = Runs(exclude_images(STACK, [3]), Options(), excluded=(3,), truth=np.delete(truth, 3, 0))
+    painter.paint(compose(runs, {}, state), None, rested=True)
+    assert (canvas.take()["other overlay"] == (*PALETTE[Factor(4)], 255)).all()
 
 
 def test_on_the_surface_both_are_one_picture(painter: Painter, canvas: FakeCanvas) -> None:

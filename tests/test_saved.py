@@ -203,3 +203,18 @@ def test_no_session_holds_more_than_a_file_can() -> None:
         Saved(notes="x" * (MAX_TEXT + 1))
     with pytest.raises(OptionError, match="exclude names image 1 twice"):
         Saved(exclusions=(1, 1))
+
+
+def test_no_image_is_left_out_once_there_are_more_or_fewer() -> None:
+    saved = Saved(replace(STATE, image=3), exclusions=(4, 7), notes="mine")
+    for count in (SHAPE[0], None):
+        assert decode_saved(encode_saved(saved, count), SHAPE) == (saved, ())
+    for K in (SHAPE[0] - 1, SHAPE[0] + 1):
+        found, (told,) = decode_saved(encode_saved(saved, SHAPE[0]), (K, *SHAPE[1:]))
+        assert (found.exclusions, found.state, found.notes) == ((), saved.state, "mine")
+        assert f"of {SHAPE[0]} images, where there are {K} now" in told
+        assert decode_saved(encode_saved(Saved(), SHAPE[0]), (K, *SHAPE[1:]))[1] == ()
+    hostile = encode_saved(saved, SHAPE[0]).replace(b'"images": 10', b'"images": "many"')
+    found, told = decode_saved(hostile, SHAPE)
+    assert found == saved
+    assert "images is not as it can be" in told[0]

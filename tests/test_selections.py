@@ -9,7 +9,7 @@ from photolin.load import LoadOptions
 from photolin.load.exclude import exclude_images
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
-from webapp.selections import KEPT, Selections
+from webapp.selections import KEPT, Selections, follow_image
 from webapp.source import Source
 
 SCENE = render_scene("sphere_cone", size=(16, 20), images=9)
@@ -59,3 +59,24 @@ def test_tabs_share_a_selection_and_old_ones_are_let_go() -> None:
 def test_too_many_or_unknown_images_are_refused(excluded: tuple[int, ...], words: str) -> None:
     with pytest.raises(OptionError, match=words):
         Selections(Source(SCENE.stack)).without(excluded)
+
+
+@pytest.mark.parametrize(
+    ("excluded", "expected"),
+    [((0,), (0, 3, 5)), ((), (1, 4, 6)), ((2, 5), (1, 3, 4)), ((0, 1), None), ((6,), None)],
+)
+def test_base_images_that_were_asked_for_stay_the_same_images_or_are_chosen_anew(
+    excluded: tuple[int, ...], expected: tuple[int, int, int] | None
+) -> None:
+    options = Options(T=0.05, Ts=0.02, base_images=(0, 3, 5))  # images 1, 4, 6 of all
+    reading = LoadOptions(exclude=(0,))
+    runs = Selections(Source(SCENE.stack, None, options, reading=reading)).without(excluded)
+    assert runs.options.base_images == expected
+
+
+def test_an_image_is_followed_to_its_new_number_or_to_that_of_the_next() -> None:
+    assert follow_image(8, 3, (), (0, 2)) == 1
+    assert follow_image(8, 1, (0, 2), ()) == 3
+    assert follow_image(8, 3, (), (3,)) == 3
+    assert follow_image(8, 7, (), (7,)) == 6
+    assert follow_image(8, 99, (0,), (0,)) == 6

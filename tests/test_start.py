@@ -57,3 +57,9 @@ def test_the_session_of_a_result_goes_before_its_own_exclusions(exclude: tuple[i
     kept = replace(KEPT, exclusions=exclude)
     source = Source(STACK, RESULT, RESULT.options, reading=LoadOptions(exclude=(0,)))
     assert start_from(source, kept) == kept
+
+
+def test_the_image_that_was_shown_stays_when_others_are_left_out() -> None:
+    kept = replace(KEPT, state=replace(KEPT.state, image=3), exclusions=(0,))  # image 4 of all
+    begun = start_from(Source(STACK, reading=LoadOptions(exclude=(1, 2))), kept)
+    assert (begun.state.image, begun.exclusions) == (2, (1, 2))

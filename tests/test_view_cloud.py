@@ -14,6 +14,7 @@ from browser import wait_until
 from photolin.analysis import Analysis, Method, Options
 from photolin.candidates import draw_candidates
 from photolin.errors import Cancelled, DegenerateError
+from photolin.load.exclude import exclude_images
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import Frame, compose
@@ -341,3 +342,20 @@ def test_lights_are_directions_where_known_and_coefficients_elsewhere(seen: Seen
     recovered: Any = SimpleNamespace(shape=SimpleNamespace(lights=-given.lights), analysis=RESULT)
     seen.view.draw(replace(frame(), recovered=recovered))
     assert "Lights of all 8 images as recovered" in seen.lights
+
+
+def test_clouds_keep_no_stack_and_no_result_that_others_have_followed(seen: Seen) -> None:
+    seen.release.set()
+    seen.clicks.seen(True)
+    seen.view._source.value = "linearized bases"
+    gone = replace(RESULT)
+    seen.view.draw(frame(analysis=gone))
+    seen.wait_for(f"Image {ONE}: ")
+    seen.view.draw(frame(OTHER))
+    seen.wait_for(f"Image {OTHER}: ")
+    wait_until(lambda: all(wanted.analysis is not gone for wanted in seen.view._clouds))
+    assert len(seen.view._clouds) == 1
+    left = exclude_images(STACK, [7])
+    few = analyze(left, Options(T=0.05, Ts=0.02, samples=20))
+    seen.view.draw(compose(Runs(left, Options()), {"robust": few}, ViewState(Ts=0.02)))
+    wait_until(lambda: all(wanted.stack is left for wanted in seen.view._clouds))

@@ -364,3 +364,21 @@ def test_results_that_arrive_at_once_are_all_kept(work: Work, monkeypatch) -> No
     work.deliver("classification", RESULT)
     other.join(5)
     assert set(work.results) == {"classification", "statistical"}
+
+
+@pytest.mark.parametrize("what", ["recover", "suggest"])
+def test_what_ends_after_others_have_taken_over_moves_nothing(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    def close_and_go_on(*asked: object, **named: object) -> object:
+        work.close()  # its last look at whether to stop is over
+        return None
+
+    monkeypatch.setattr(module, "recover_shape", close_and_go_on)
+    monkeypatch.setattr(Runs, "suggest", close_and_go_on)
+    if what == "suggest":
+        work.suggest()
+    else:
+        work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
+    assert (tab.moved, tab.shaped, tab.told) == ([], 0, [])

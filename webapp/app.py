@@ -6,12 +6,15 @@ from threading import Lock
 
 import viser
 
+from photolin.errors import PhotolinError
+
 from .access import Server, open_server
 from .keeper import Keeper
+from .saved import Saved
 from .selections import Selections
 from .session import Session
 from .source import Source
-from .start import start_from
+from .start import leave_out, start_from
 
 
 class App:
@@ -21,9 +24,11 @@ class App:
         """Start serving.
 
         Raises:
-            OptionError: the host or port cannot be used.
+            PhotolinError: the host or port cannot be used, or there is nothing to show without the
+                images that are to be left out at first.
         """
         self._selections = Selections(source)
+        self._selections.without(source.reading.exclude)  # kept for the first tab
         self._sessions: dict[int, Session] = {}
         self._lock = Lock()
         self._untold: list[str] = []
@@ -42,6 +47,8 @@ class App:
             self._sessions.clear()
         for session in sessions:
             session.close()
+        for session in sessions:
+            session.wait()
         self._keeper.close()
         self.server.stop()
 
@@ -61,6 +68,7 @@ class App:
         else:
             start = kept
         again = kept is not None
+        start = self._possible(start)
         session = Session(client, self._selections, self._keeper, start, again=again)
         with self._lock:
             self._sessions[client.client_id] = session
@@ -69,6 +77,17 @@ class App:
             session.notices.say("Session", sentence, "red")
         if client.client_id not in self.server.server.get_clients():  # left while it was built
             self._detach(client)
+
+    def _possible(self, start: Saved) -> Saved:
+        """A start that a tab can be built from; other lights may have come that lie in a plane."""
+        source = self._selections.source
+        try:
+            self._selections.without(start.exclusions)
+        except PhotolinError as error:
+            with self._lock:
+                self._untold.append(f"images are not left out as they were: {error}")
+            return leave_out(source, start, source.reading.exclude)
+        return start
 
     def _detach(self, client: viser.ClientHandle) -> None:
         with self._lock:
@@ -87,7 +106,7 @@ def serve(
     """Serve until Ctrl-C; opens the browser or prints the address.
 
     Raises:
-        OptionError: the host or port cannot be used.
+        PhotolinError: as `App`.
     """
     # a tab may close while its worker draws; viser warns of every such message
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")

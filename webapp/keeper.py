@@ -45,7 +45,7 @@ class Keeper:
             shape: (K,H,W) of the whole stack.
             tell: told, from any thread, in a sentence whatever does not work.
         """
-        self._place, self._tell = place, tell
+        self._place, self._tell, self._count = place, tell, shape[0]
         self._changed = Condition()
         self._latest: Saved | None = None
         self._unsaved = self._closed = False
@@ -93,7 +93,7 @@ class Keeper:
             if not place.parent.is_dir():
                 raise OutputError(f"{place}: its folder is gone")
             with _writing:
-                write_files(place.parent, {place.name: encode_saved(saved)})
+                write_files(place.parent, {place.name: encode_saved(saved, self._count)})
         except OutputError as error:
             self._stay_in_memory(str(error))
 

@@ -80,6 +80,7 @@ class Sheet:
         solid = state.layer == "labels"
         look = (state.shown, state.opacity, state.outlines, state.patterns, solid, hidden)
         how = (state.image, state.thresholds, frame.analysis, frame.preview, frame.labels is None)
+        how = (frame.excluded, *how)  # the truth of another image has no analysis to tell it by
         if not is_new(self._drawn, "overlay", *how, look):
             return
         overlay = None

@@ -56,8 +56,8 @@ class Actions:
     """Pin the selected pixel, or take its pin away."""
     unpin: Callable[[], None]
     """Take all pins away."""
-    exclude: Callable[[int], None]
-    """Leave an image of the whole stack out, or take it in again."""
+    exclude: Callable[[int, bool], None]
+    """Leave an image of the whole stack out, or where false take it in again."""
     copy: Callable[[], None]
     """Copy the command that makes what is shown."""
     tell: Callable[[Exception], None]
@@ -170,6 +170,7 @@ class Panels:
     def redraw(self) -> None:
         """Show what changed in panels without a change of the state."""
         self.samples.redraw()
+        self.compare.redraw()
 
     def take(self, pixel: Pixel) -> bool:
         """Take a click on the picture where a panel asked for clicks; whether one did."""

@@ -47,10 +47,16 @@ class Saved:
         object.__setattr__(self, "exclusions", LoadOptions(exclude=self.exclusions).exclude)
 
 
-def encode_saved(saved: Saved) -> bytes:
-    """The file of a session: JSON for people to read too."""
+def encode_saved(saved: Saved, count: int | None = None) -> bytes:
+    """The file of a session: JSON for people to read too.
+
+    Args:
+        count: of the images of the whole stack, by which the reader tells whether their numbers
+            mean the same still; None where that is not to be told.
+    """
     notes = saved.notes.encode(errors="replace").decode()  # half a character is no text
-    entries = {"version": VERSION, **msgspec.to_builtins(replace(saved, notes=notes))}
+    told = msgspec.to_builtins(replace(saved, notes=notes))
+    entries = {"version": VERSION, "images": count, **told}
     return msgspec.json.format(msgspec.json.encode(entries), indent=1) + b"\n"
 
 
@@ -58,8 +64,9 @@ def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple
     """The session of a file, whatever it holds.
 
     Numbers beyond their range are brought into it; images, pixels and pins that the stack does not
-    have are dropped, as it may have changed, and so are pins beyond the most there can be. What
-    else cannot be is as in a new session.
+    have are dropped, as it may have changed, and so are pins beyond the most there can be. No image
+    is left out where the stack had another number of them: it might be a wrong one. What else
+    cannot be is as in a new session.
 
     Args:
         shape: (K,H,W) of the whole stack.
@@ -89,6 +96,8 @@ def decode_saved(data: bytes, shape: tuple[int, int, int]) -> tuple[Saved, tuple
         exclusions = LoadOptions(exclude=exclusions).exclude
         if exclusions and (exclusions[-1] >= K or K - len(exclusions) < MIN_IMAGES):
             raise OptionError("not these images, or too few besides, are there")
+        if exclusions and (count := take("images", int | None, None)) not in (None, K):
+            raise OptionError(f"of {count} images, where there are {K} now")
     except OptionError as error:
         told.append(_sentence("exclusions", error))
         exclusions = ()

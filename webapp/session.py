@@ -27,7 +27,7 @@ from .painter import Painter
 from .panels import Actions, Panels
 from .pointing import Pointing
 from .saved import Saved
-from .selections import Selections
+from .selections import Selections, follow_image
 from .state import SURFACE, Pixel, ViewState
 from .theme import set_theme
 
@@ -35,6 +35,8 @@ REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
+PARTING = 2.0
+"""Seconds that are waited, at most, for a tab that was closed to keep what it showed."""
 
 
 class Session:
@@ -62,6 +64,7 @@ class Session:
         self._shown_results: dict[Method, Analysis] | None = None
         self._excluded = start.exclusions
         self._saved: Saved | None = None
+        self._again = again
         first = None if again else start.state.thresholds
         self._bench = Bench(selections, self._excluded, first, self._desk())
         self._changed = monotonic()
@@ -74,7 +77,8 @@ class Session:
             self._pointing.restore(start.state)
             self._panels.restore(start)
         self._wake.set()
-        Thread(target=self._draw, name="tab", daemon=True).start()
+        self._worker = Thread(target=self._draw, name="tab", daemon=True)
+        self._worker.start()
 
     def close(self) -> None:
         """Stop all work for the tab."""
@@ -82,6 +86,10 @@ class Session:
         self._bench.close()
         self._panels.close()
         self._wake.set()
+
+    def wait(self) -> None:
+        """Wait, once it is closed, until what was done last is kept."""
+        self._worker.join(PARTING)
 
     def _build(self, state: ViewState) -> None:
         _, H, W = self._source.stack.shape
@@ -180,9 +188,10 @@ class Session:
         notes, convention = self._panels.notes.read(), self._panels.export.convention()
         self._bench.work.download(kind, everything, notes, convention)
 
-    def _exclude(self, image: int) -> None:
+    def _exclude(self, image: int, out: bool = True) -> None:
         """Leave an image of the whole stack out, or take it in again."""
-        self._excluded = tuple(sorted({*self._excluded} ^ {image}))
+        others = {*self._excluded} - {image}
+        self._excluded = tuple(sorted(others | {image} if out else others))
         self._wake.set()
 
     def _copy(self) -> None:
@@ -211,6 +220,8 @@ class Session:
             except Exception as error:
                 rough = False
                 self.notices.tell(error)
+        if self._saved is not None:  # what was done just before the tab was closed is kept too
+            self._keep(self._read(), rested=True)
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""
@@ -268,20 +279,20 @@ class Session:
             self._excluded = before
             self.notices.tell(error)
             return
-        count = len(self._source.stack.images)
-        left = [k for k in range(count) if k not in before]
-        now = [k for k in range(count) if k not in self._bench.runs.excluded]
-        image = next((n for n, k in enumerate(now) if k >= left[shown]), len(now) - 1)
-        self._panels.picture.restock(len(now), image)
+        runs = self._bench.runs
+        image = follow_image(len(self._source.stack.images), shown, before, runs.excluded)
+        self._panels.picture.restock(len(runs.stack.images), image)
         if self._bench.work.recovered is not None:
             self._panels.picture.offer(surface=True)
 
     def _keep(self, state: ViewState, rested: bool) -> bool:
         """Keep the session once it rests; whether that is still to come.
 
-        A tab in which nobody has done anything keeps nothing.
+        A tab in which nobody has done anything keeps nothing: what it shows at first is known once
+        the first result has moved the sliders, where it does. Later there may be no result for
+        long, or for good, of the images that are left.
         """
-        if not self._bench.work.results:
+        if self._saved is None and not (self._again or self._bench.work.results):
             return False
         saved = Saved(state, self._bench.runs.excluded, self._panels.notes.read())
         if saved == self._saved or not rested:

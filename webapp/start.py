@@ -5,6 +5,7 @@ from dataclasses import replace
 from photolin.factors import Thresholds
 
 from .saved import Saved
+from .selections import follow_image
 from .source import Source
 from .state import ViewState
 
@@ -34,8 +35,14 @@ def start_from(source: Source, kept: Saved | None) -> Saved:
     given = {name: value for name in ("T", "Ts") if (value := getattr(options, name)) is not None}
     if options.method != type(options)().method:
         given["method"] = options.method
-    if (exclude := source.reading.exclude) and exclude != kept.exclusions:
-        count = len(source.stack.images) - len(exclude)
-        kept = replace(kept, exclusions=exclude)
-        given["image"] = min(kept.state.image, count - 1)
-    return replace(kept, state=replace(kept.state, **given))
+    kept = replace(kept, state=replace(kept.state, **given))
+    if exclude := source.reading.exclude:
+        kept = leave_out(source, kept, exclude)
+    return kept
+
+
+def leave_out(source: Source, kept: Saved, exclude: tuple[int, ...]) -> Saved:
+    """What was kept with other images left out, at the same image or the next one."""
+    count = len(source.stack.images)
+    image = follow_image(count, kept.state.image, kept.exclusions, exclude)
+    return replace(kept, state=replace(kept.state, image=image), exclusions=exclude)

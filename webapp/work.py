@@ -178,7 +178,8 @@ class Work:
     def _suggest(self) -> None:
         with cancelling("suggestion", "T and Ts are kept"):
             suggested = self._runs.suggest(self._desk.progress, self._job.stopping)
-        self._desk.move(suggested)
+        if not self._job.closed:  # else they are of other images
+            self._desk.move(suggested)
 
     def _settled(self, state: ViewState) -> Analysis:
         """The result on screen; where that is a preview, a run for the same thresholds.
@@ -209,7 +210,8 @@ class Work:
                 cancel=self._job.stopping,
             )
         self._recovered = Recovered(shape, analysis)
-        self._desk.shaped()
+        if not self._job.closed:  # else it is of other images, whose layers nobody can show
+            self._desk.shaped()
 
     def _send(
         self, state: ViewState, make: Callable[[Analysis, ViewState], tuple[str, bytes]]

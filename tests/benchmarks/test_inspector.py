@@ -191,7 +191,7 @@ def use(session: Session, seconds: float, seed: int) -> int:
         session._panels.run.turn,
         session._bench.suggest,
         session._bench.linearize,
-        lambda: session._exclude(int(rng.integers(3))),
+        lambda: session._exclude(int(rng.integers(3)), bool(rng.integers(2))),
     ]
     end, count = time.monotonic() + seconds, 0
     while time.monotonic() < end:

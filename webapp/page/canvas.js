@@ -179,7 +179,7 @@ window.openCanvas = (options) => {
     setTitles: widgets.setTitles,
     setSampling: band.setSampling,
     setBoxes: band.setBoxes,
-    copy: (text) => navigator.clipboard?.writeText(text),
+    copy: widgets.copy,
     close,
   };
 };

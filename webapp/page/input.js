@@ -5,6 +5,8 @@ function openInput({
 }) {
   const CAMERA_KEYS = /^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/;
 
+  const STEPS = /^(Arrow.*|[[\]{}zxu])$/i; // keys that go on while they are held
+
   const { canvas } = viewer;
   const hover = sender(hoverId);
 
@@ -68,8 +70,13 @@ function openInput({
     h: cards.toggleHint, "?": cards.toggleKeys,
   };
 
+  /** Whether it is one of the system's or the browser's own; brackets may need AltGr, which some
+   * systems tell as Ctrl and Alt. */
+  const isChord = (event) =>
+    (event.ctrlKey || event.metaKey || event.altKey) && !event.getModifierState("AltGraph");
+
   function onKey(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || isForWidget(event)) return;
+    if (isChord(event) || isForWidget(event)) return;
     if (event.key === "Escape" && cards.closeKeys()) return;
     const action = local[event.key.toLowerCase()];
     const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
@@ -78,7 +85,7 @@ function openInput({
       event.stopPropagation(); // it would open again
       giveFocusBack();
     }
-    if (!action) return report(keyId, event.key);
+    if (!action) return event.repeat && !STEPS.test(event.key) ? undefined : report(keyId, event.key);
     event.preventDefault();
     if (!event.repeat && camera.placed()) action();
   }

@@ -1,5 +1,5 @@
-// What viser's widgets leave out: typing beyond the ends of a slider, tooltips of buttons, and
-// tooltips that go once a widget is used, as one looks at the picture then.
+// What viser's widgets leave out: typing beyond the ends of a slider, tooltips of buttons, tooltips
+// that go once a widget is used, as one looks at the picture then, and the clipboard.
 
 function openWidgets({ listen }) {
   const reaches = new Map(); // id of a slider -> the most that may be typed into its box
@@ -40,7 +40,23 @@ function openWidgets({ listen }) {
     quiet.remove("photolin-quiet");
   }, true);
 
+  /** Put text on the clipboard, after a click or a key. */
+  async function copy(text) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      // forbidden; or not there, as in pages of other machines, which come without TLS
+      const area = document.body.appendChild(document.createElement("textarea"));
+      area.style.cssText = "position:fixed;top:0;opacity:0";
+      area.value = text;
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+  }
+
   return {
+    copy,
     setReach: (id, most) => reaches.set(id, most),
     setTitles: (pairs) => pairs.forEach(([id, title]) => titles.set(id, title)),
   };

@@ -198,6 +198,9 @@ class CloudView(Watched):
             self._tell(error)
         with self._lock:
             self._clouds[wanted] = made
+            # what they are of is kept with them: stacks and results that are gone are not
+            for other in [w for w in self._clouds if not is_alike(w, wanted)]:
+                del self._clouds[other]
             for oldest in list(self._clouds)[:-KEPT]:
                 del self._clouds[oldest]
 
@@ -238,6 +241,12 @@ class CloudView(Watched):
             return _paragraph(describe_coefficients(len(names), image)) + plot
         told = describe_lights(len(names), image, recovered=shape is not None)
         return _paragraph(told) + plot_lights(lights, image, names)
+
+
+def is_alike(one: Wanted, other: Wanted) -> bool:
+    """Whether both are of one stack, and not of two results."""
+    of_one = one.analysis is other.analysis or None in (one.analysis, other.analysis)
+    return one.stack is other.stack and of_one
 
 
 def _paragraph(text: str) -> str:

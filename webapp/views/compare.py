@@ -33,9 +33,11 @@ class CompareView(Watched):
         """Build it.
 
         Args:
+            changed: asks that all is read and `redraw` is called soon, by the thread that draws.
             add_choice: adds the choice of the compared method.
             known: whether frames come with the truth.
         """
+        self._changed, self._stale = changed, False
         super().__init__(clicks, "compare")
         self._offered = tuple(one for one in AGAINST if known or one != TRUTH)
         self._against = gui.add_dropdown(
@@ -105,6 +107,17 @@ class CompareView(Watched):
 
     def _read_arrangement(self) -> Arrangement:
         return choose_option(self._arrangement.value, ARRANGEMENTS, ARRANGEMENTS[0])
+
+    def redraw(self) -> None:
+        """Show what is lacking since it came into view; from the thread that draws."""
+        if self._stale and self._frame is not None:
+            self._stale = False
+            self.draw(self._frame)
+
+    def _see(self, shown: bool) -> None:
+        # counting labels takes long, and this is called on the one loop of all tabs
+        self._shown = self._stale = shown
+        self._changed()
 
     def _show(self, frame: Frame) -> None:
         """Name both pictures, and tell how far their labels agree."""

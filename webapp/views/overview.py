@@ -37,7 +37,7 @@ class OverviewView:
         whole: ImageStack,
         picture: PictureView,
         changed: Callable[[], None],
-        exclude: Callable[[int], None],
+        exclude: Callable[[int, bool], None],
         tell: Callable[[Exception], None],
     ) -> None:
         """Build the widgets.
@@ -46,7 +46,8 @@ class OverviewView:
             whole: the stack with all its images.
             picture: goes to images and layers.
             changed: called when the state is to be read again.
-            exclude: leaves an image of `whole` out, or takes it in again.
+            exclude: leaves an image of `whole` out, or where false takes it in again; as often as
+                it is asked, for the frame follows later.
             tell: called with what went wrong.
         """
         self._whole, self._picture, self._exclude = whole, picture, exclude
@@ -118,12 +119,12 @@ class OverviewView:
     def leave_out(self) -> None:
         """Leave the image shown out."""
         if (frame := self._frame) is not None:
-            self._exclude(kept_images(frame, self._whole)[frame.state.image])
+            self._exclude(kept_images(frame, self._whole)[frame.state.image], True)
 
     def take_all_in(self) -> None:
         """Take all images in again."""
-        for image in () if self._frame is None else self._frame.excluded:
-            self._exclude(image)
+        for image in range(len(self._whole.images)):
+            self._exclude(image, False)
 
     def close(self) -> None:
         """Stop looking at results."""
@@ -134,7 +135,7 @@ class OverviewView:
         if (frame := self._frame) is None or number >= len(self._whole.images):
             return
         if part == "toggle":
-            self._exclude(number)
+            self._exclude(number, number not in frame.excluded)
         elif part == "image" and number not in frame.excluded:
             self._picture.go(kept_images(frame, self._whole).index(number))
         elif part == "cancel":
