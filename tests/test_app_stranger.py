@@ -109,8 +109,8 @@ def adjust_on_the_landscape(page: Any, session: Session) -> None:
 def diagnose_three_pixels(page: Any, session: Session) -> None:
     go_to(page, "Pixel")
     labels = session._bench.work.results["robust"].labels[:, 20:]
-    for factor in (Factor.SPECULAR, Factor.CAST, Factor.DIFFUSE):
-        row, column = np.argwhere((labels == factor).any(axis=0))[3] + (20, 0)
+    for n, factor in enumerate((Factor.SPECULAR, Factor.CAST, Factor.DIFFUSE)):
+        row, column = np.argwhere((labels == factor).any(axis=0))[3 + 40 * n] + (20, 0)
         click_pixel(page, int(row), int(column))
         wait_until(lambda at=(row, column): session._pointing.pixel == at)
         told = page.get_by_text(f"row {row}, column {column}").locator("visible=true")
