@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import imagecodecs
@@ -12,12 +13,16 @@ import tifffile
 from command_line import complaint
 from test_shape_chrome_ball import mirror, sky
 
+from photolin.analysis import Options
 from photolin.cli import main
+from photolin.console import shape_summary
 from photolin.export import load_result, load_shape
 from photolin.load import load_stack
 from photolin.load.lights import read_lights
+from photolin.pipeline import analyze
 from photolin.shape.directions import angles_between
-from photolin.synthetic import load_truth
+from photolin.shape.resolve import resolve_ambiguity
+from photolin.synthetic import load_truth, render_scene
 
 SIZE = (60, 80)
 PIXELS = [(10, 40), (30, 22), (50, 45), (27, 57), (40, 30)]
@@ -512,3 +517,16 @@ def test_a_ball_without_mask_or_without_a_spot_is_refused(
     line = complaint(["lights", dark, tmp_path / "out"], capsys)
     assert "image ball3.png shows no spot on the ball; take it out, or mark the ball better" in line
     assert not (tmp_path / "out").exists()
+
+
+def test_normals_on_fewer_than_three_diffuse_observations_are_counted() -> None:
+    scene = render_scene("sphere_cone", size=(24, 32), images=8)
+    result = analyze(scene.stack, Options(T=0.05, Ts=0.02, samples=50))
+    assert result.confidence is not None
+    diffuse = np.where(result.mask, 8, 0).astype(np.uint16)
+    resolved = resolve_ambiguity(result)
+    for few in (0, 5):
+        diffuse[0, :few] = 2
+        weak = replace(result, confidence=replace(result.confidence, diffuse=diffuse))
+        said = shape_summary(weak, resolved)
+        assert ("marked: 5 normals rest on fewer than three" in said) == (few == 5)
