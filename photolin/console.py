@@ -178,8 +178,8 @@ def shape_summary(result: Analysis, resolved: Resolved) -> str:
         weak = np.count_nonzero(result.determined() & (result.confidence.diffuse < 3))
         if weak:
             lines.append(
-                f"marked: {weak} normals rest on fewer than three diffuse observations, and lean on "
-                "others; there `diffuse` in result.npz is below 3"
+                f"marked: {weak} normals rest on fewer than three diffuse observations; there "
+                "`diffuse` in result.npz is below 3"
             )
     doubts = (*result.warnings, *resolved.doubts)
     return "\n".join([*lines, *(f"warning: {text}" for text in doubts)])

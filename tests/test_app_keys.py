@@ -13,6 +13,7 @@ from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.session import Session
 from webapp.source import Source
+from webapp.values import MAX_TEXT
 
 pytestmark = [
     pytest.mark.browser,
@@ -84,3 +85,13 @@ def test_the_command_is_copied_where_a_page_has_no_clipboard_of_its_own(
     page.locator("textarea:visible").click()
     page.keyboard.press("Control+V")
     wait_until(lambda: session._panels.notes.read().startswith("photolin run "))
+
+
+def test_notes_end_in_the_page_where_they_end_in_the_session(page: Any, app: App) -> None:
+    session = enter(page, app)
+    page.get_by_role("tab", name="Export").click()
+    page.locator("textarea:visible").click()
+    page.keyboard.insert_text("a" * (MAX_TEXT - 1))
+    page.keyboard.insert_text("bcd")
+    wait_until(lambda: session._panels.notes.read() == "a" * (MAX_TEXT - 1) + "b")
+    assert page.locator("textarea:visible").input_value() == session._panels.notes.read()

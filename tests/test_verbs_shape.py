@@ -527,6 +527,6 @@ def test_normals_on_fewer_than_three_diffuse_observations_are_counted() -> None:
     resolved = resolve_ambiguity(result)
     for few in (0, 5):
         diffuse[0, :few] = 2
-        weak = replace(result, confidence=replace(result.confidence, diffuse=diffuse))
+        weak = replace(result, confidence=replace(result.confidence, diffuse=diffuse.copy()))
         said = shape_summary(weak, resolved)
         assert ("marked: 5 normals rest on fewer than three" in said) == (few == 5)

@@ -382,3 +382,20 @@ def test_what_ends_after_others_have_taken_over_moves_nothing(
         work.recover(Known(), given_lights=True, px_mm=None)
     tab.wait()
     assert (tab.moved, tab.shaped, tab.told) == ([], 0, [])
+
+
+@pytest.mark.parametrize("kind", ["labels", "shape"])
+def test_files_that_do_not_come_as_others_have_taken_over_are_told_of(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    def close_and_go_on(*asked: object) -> tuple[str, bytes]:
+        work.close()
+        return "name", b"data"
+
+    monkeypatch.setattr(module, "make_download", close_and_go_on)
+    monkeypatch.setattr(module, "make_shape_download", close_and_go_on)
+    work.download(kind, everything=True, notes="")
+    tab.wait()
+    (error,) = tab.told
+    assert str(error) == "export cancelled, as other images are left out; nothing was saved"
+    assert tab.sent == {}

@@ -26,6 +26,7 @@ from .relief import MESH, Relief
 from .second import PLANES, Second
 from .sketch import Sketch
 from .state import Pixel
+from .values import MAX_TEXT
 from .viser_internals import call_javascript, run_javascript, set_encoded, widget_id
 
 WORLD_HEIGHT = 10.0
@@ -91,6 +92,7 @@ class Canvas:
             "bandId": widget_id(self._band),
             "keys": [(key.shown, key.does) for key in KEYS],
             "hint": HINT,
+            "mostText": MAX_TEXT,
         }
         call_javascript(client, "window.openCanvas", options)
 

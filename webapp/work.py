@@ -104,7 +104,7 @@ class Work:
             convention: of the normals' picture, with a shape.
         """
         if kind == SHAPE:
-            self._begin(partial(self._send_shape, convention))
+            self._begin(partial(self._promise, partial(self._send_shape, convention)))
         else:
             chosen = partial(self._pack, kind, everything)
             if kind == REPORT:
@@ -112,7 +112,7 @@ class Work:
             elif kind in FIGURE_KINDS:
                 job = self._job
                 chosen = partial(make_figure, self._runs, kind, self._desk.progress, job.stopping)
-            self._begin(partial(self._send, self._desk.read(), chosen))
+            self._begin(partial(self._promise, partial(self._send, self._desk.read(), chosen)))
 
     def recover(self, known: Known, given_lights: bool, px_mm: float | None) -> None:
         """Recover the shape from the result on screen, when what is running has ended.
@@ -212,6 +212,16 @@ class Work:
         self._recovered = Recovered(shape, analysis)
         if not self._job.closed:  # else it is of other images, whose layers nobody can show
             self._desk.shaped()
+
+    def _promise(self, send: Callable[[], None]) -> None:
+        """Send files, or say that none will come, also after others have taken over."""
+        try:
+            send()
+        except Cancelled:
+            if self._job.closed:
+                why = "export cancelled, as other images are left out; nothing was saved"
+                self._desk.tell(Cancelled(why))
+            raise
 
     def _send(
         self, state: ViewState, make: Callable[[Analysis, ViewState], tuple[str, bytes]]

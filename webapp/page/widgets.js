@@ -1,7 +1,7 @@
-// What viser's widgets leave out: typing beyond the ends of a slider, tooltips of buttons, tooltips
-// that go once a widget is used, as one looks at the picture then, and the clipboard.
+// What viser's widgets leave out: typing beyond the ends of a slider, an end of texts, tooltips of
+// buttons, tooltips that go once a widget is used, as one looks at the picture then, the clipboard.
 
-function openWidgets({ listen }) {
+function openWidgets({ listen, mostText }) {
   const reaches = new Map(); // id of a slider -> the most that may be typed into its box
   const titles = new Map(); // id of a button -> its tooltip
 
@@ -15,6 +15,8 @@ function openWidgets({ listen }) {
     return typed > end && typed <= reaches.get(slider?.id);
   }
 
+  // the server takes no longer text: what is typed beyond would be seen here, and kept nowhere
+  listen(window, "focusin", ({ target }) => target.tagName === "TEXTAREA" && (target.maxLength = mostText));
   listen(window, "focusout", (event) => isBeforeAnswer(event) && event.stopPropagation(), true);
   // tabs make their buttons anew when they are opened
   listen(window, "pointerover", ({ target }) => {
