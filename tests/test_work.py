@@ -392,6 +392,8 @@ def test_files_that_do_not_come_as_others_have_taken_over_are_told_of(
         work.close()
         return "name", b"data"
 
+    work.recover(Known(), given_lights=True, px_mm=None)
+    tab.wait()
     monkeypatch.setattr(module, "make_download", close_and_go_on)
     monkeypatch.setattr(module, "make_shape_download", close_and_go_on)
     work.download(kind, everything=True, notes="")
