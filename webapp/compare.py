@@ -10,7 +10,7 @@ from .frame import Frame
 from .layers import hides_labels, render_layer
 from .patterns import add_marks
 from .render import tabulate_colours
-from .state import TRUTH
+from .state import SURFACE, TRUTH
 
 Picture = NDArray[np.uint8]
 
@@ -21,10 +21,11 @@ LINE = (255, 255, 255)
 def other_frame(frame: Frame) -> Frame | None:
     """The frame of the right picture: another layer, by the method beside where there is one.
 
-    That of the truth has no analysis. None where nothing is compared, or a truth is not known.
+    That of the truth has no analysis. None where nothing is compared, and where there is no truth
+    or no shape to compare with.
     """
     state = frame.state
-    if state.against is None:
+    if state.against is None or (state.against in SURFACE and frame.shape is None):
         return None
     if state.against == TRUTH:
         if frame.truth is None:

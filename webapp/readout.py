@@ -240,8 +240,11 @@ def tell_threshold(value: float) -> str:
 
 
 def _apart(a: float, b: float) -> tuple[str, str]:
-    """Both numbers with as many decimals, 4 to 8, as it takes to tell them apart."""
+    """Both numbers with as many decimals, 4 to 8, as it takes to tell them apart, and from zero."""
     decimals = 4
-    while f"{a:z.{decimals}f}" == f"{b:z.{decimals}f}" and a != b and decimals < 8:
+    while decimals < 8 and (
+        (a != b and f"{a:z.{decimals}f}" == f"{b:z.{decimals}f}")
+        or any(v and not float(f"{v:.{decimals}f}") for v in (a, b))  # would read as zero
+    ):
         decimals += 1
     return f"{a:z.{decimals}f}", f"{b:z.{decimals}f}"

@@ -33,6 +33,9 @@ from .theme import set_theme
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
+STEP = 1.0
+"""Seconds without a change after which what follows is another step to undo: a slider that is
+dragged slowly rests now and then."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
 PARTING = 2.0
@@ -211,7 +214,8 @@ class Session:
     def _draw(self) -> None:
         rough = False
         while not self._closed.is_set():
-            self._wake.wait(max(self._changed + REST - monotonic(), 0.01) if rough else None)
+            rest = next((rest for rest in (REST, STEP) if not self._rested(rest)), 0.0)
+            self._wake.wait(max(self._changed + rest - monotonic(), 0.01) if rough else None)
             self._wake.clear()
             try:
                 rough = self._round()
@@ -235,8 +239,8 @@ class Session:
         state, results, frame = self._read(), bench.work.results, self._frame
         if frame is None or state != frame.state:
             self._changed = monotonic()
-        rested = monotonic() - self._changed >= REST
-        moving = self._panels.thresholds.settle(state.thresholds, rested)
+        rested = self._rested(REST)
+        moving = self._panels.thresholds.settle(state.thresholds, self._rested(STEP))
         bench.work.ensure(state)
         preview = self._follow(state, results)
         recovered = bench.work.recovered
@@ -257,6 +261,10 @@ class Session:
         behind = bench.catch_up.pursue(state, results.get(state.method), rested)
         return self._keep(state, rested) or behind or rough or moving
 
+    def _rested(self, seconds: float) -> bool:
+        """Whether nothing has changed for so long."""
+        return monotonic() - self._changed >= seconds
+
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
         """What the thresholds of the view make of what is on screen, where no run is right yet."""
         near, began = results.get(state.method), monotonic()
@@ -273,6 +281,7 @@ class Session:
     def _select(self) -> None:
         """Go on without the images that are left out, with the one shown if it is still there."""
         before, shown = self._bench.runs.excluded, self._read().image
+        had_shape = self._bench.work.recovered is not None
         try:
             self._bench.select(self._excluded)
         except PhotolinError as error:
@@ -284,6 +293,8 @@ class Session:
         self._panels.picture.restock(len(runs.stack.images), image)
         if self._bench.work.recovered is not None:
             self._panels.picture.offer(surface=True)
+        elif had_shape:
+            self.notices.say("Shape", "it was of other images; recover it again (key: N)")
 
     def _keep(self, state: ViewState, rested: bool) -> bool:
         """Keep the session once it rests; whether that is still to come.

@@ -6,6 +6,7 @@ from functools import partial
 from threading import Lock
 
 from photolin.analysis import Analysis, Method
+from photolin.compiling import tell_compiling
 from photolin.errors import Cancelled, OptionError
 from photolin.export.maps import Convention
 from photolin.factors import Thresholds
@@ -199,14 +200,14 @@ class Work:
         analysis = self._settled(self._desk.read())
         self._desk.progress("shape", 0.0)
         earlier = "the earlier one is kept" if self._recovered else "there is none"
-        with cancelling("shape", earlier):
+        with cancelling("shape", earlier), tell_compiling(self._desk.progress) as progress:
             told = analysis if given_lights else replace(analysis, lights=None)
             shape = recover_shape(
                 self._runs.stack,
                 analysis,
                 resolve_ambiguity(told, known),
                 px_mm=px_mm,
-                progress=self._desk.progress,
+                progress=progress,
                 cancel=self._job.stopping,
             )
         self._recovered = Recovered(shape, analysis)

@@ -10,7 +10,7 @@ from ..clicks import Clicks
 from ..compare import other_frame
 from ..frame import Frame
 from ..readout import escape
-from ..state import AGAINST, ARRANGEMENTS, TRUTH, Arrangement, ViewState
+from ..state import AGAINST, ARRANGEMENTS, SURFACE, TRUTH, Arrangement, ViewState
 from ..values import choose_option, clamp_number
 from . import INDENT
 from .watched import Watched
@@ -124,7 +124,7 @@ class CompareView(Watched):
         state, other = frame.state, other_frame(frame)
         table = ""
         if other is None:
-            text = "Choose a right picture to compare with the one shown."
+            text = _invite(state)
         else:
             text = f"Left: {state.layer} by {state.method}. Right: {_name(frame, other)}."
             if state.beside is not None and frame.beside is None:
@@ -133,6 +133,16 @@ class CompareView(Watched):
         self._told.content = (
             f'<div id="{self._id}" style="{INDENT};font-size:0.8em">{escape(text)}{table}</div>'
         )
+
+
+def _invite(state: ViewState) -> str:
+    if state.against in SURFACE:
+        return f"There is no {state.against} yet; recover a shape in the tab Shape first."
+    if state.beside is not None:
+        return (
+            f"Choose a right picture, labels for instance, to see what {state.beside} makes of it."
+        )
+    return "Choose a right picture to compare with the one shown."
 
 
 def _name(frame: Frame, other: Frame) -> str:

@@ -122,9 +122,11 @@ class PictureView:
         """Name what is shown."""
         K, H, W = frame.stack.shape
         file = frame.stack.names[frame.state.image]
+        out = len(frame.excluded)
+        left = f" ({out} left out)" if out else ""
         self._name.content = (
             f'<div style="{INDENT};font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
-            f"&nbsp;{K} images, {H} rows × {W} columns &nbsp;<b>{escape(Path(file).name)}</b></div>"
+            f"&nbsp;{K} images{left}, {H} rows × {W} columns &nbsp;<b>{escape(Path(file).name)}</b></div>"
         )
 
     def _read_image(self) -> int:

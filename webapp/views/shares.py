@@ -12,10 +12,12 @@ from photolin.factors import Factor
 from ..frame import Frame
 from ..readout import escape, legend
 from ..render import encode_labels
-from . import INDENT
+from . import ATTENTION, INDENT
 
 SIDE = 12
 """Of a swatch, pixels."""
+UNDEFINED, SHADOW = 3.0, 1.0
+"""Percent of U from which, and of A and C up to which, Ts is doubted."""
 
 
 @functools.cache
@@ -48,7 +50,22 @@ class SharesView:
         self._strip.content = "".join(
             _strip(labels, method if len(rows) > 1 else "", frame.state.patterns)
             for method, labels in rows
-        )
+        ) + _doubt(rows[0][1] if rows else None)
+
+
+def _doubt(labels: NDArray[np.uint8] | None) -> str:
+    """That Ts looks too low: what is dark then fits nothing, and hardly anything is shadow."""
+    if labels is None:
+        return ""
+    percent = {row.factor: row.percent for row in legend(labels)}
+    shadow = percent[Factor.ATTACHED] + percent[Factor.CAST]
+    if percent[Factor.UNDEFINED] < UNDEFINED or shadow > SHADOW:
+        return ""
+    text = (
+        "Hardly any shadow, and much that is undefined: Ts may be too low for this picture. Raise "
+        "it, or sample shadows in the tab Samples."
+    )
+    return f'<div style="{INDENT};font-size:0.8em;{ATTENTION}">{escape(text)}</div>'
 
 
 def _strip(labels: NDArray[np.uint8], method: str, patterns: bool) -> str:
