@@ -121,7 +121,7 @@ def test_an_image_is_left_out_and_taken_in_again(
     press(page, *["ArrowRight"] * 3)
     wait_until(lambda: session._read().image == 3)
     session._exclude(3)
-    page.get_by_text("7 images, 48").wait_for()
+    page.get_by_text("7 images (1 left out)").wait_for()
     wait_until(lambda: "robust" in session._bench.work.results)
     assert session._frame is not None
     left = session._bench.work.results["robust"]

@@ -139,3 +139,8 @@ def test_what_decides_a_joined_picture_is_in_its_key() -> None:
     still = {**base, "arrangement": "difference"}
     moved = {**still, "divider": 0.9}
     assert mixture(frame(**still), other_of(**still)) == mixture(frame(**moved), other_of(**moved))
+
+
+def test_there_is_nothing_to_compare_with_before_there_is_a_shape() -> None:
+    assert other_frame(frame(against="normals")) is None
+    assert other_frame(frame(against="labels")) is not None

@@ -234,3 +234,11 @@ def test_the_time_of_a_final_result_is_told_with_its_own_thresholds_only():
     other = Thresholds(0.06, 0.02)
     assert threshold_status(other, THRESHOLDS, 0.35) == threshold_status(other, THRESHOLDS)
     assert threshold_status(THRESHOLDS, None, 0.35) == "Nothing is linearized yet."
+
+
+def test_thresholds_near_zero_do_not_read_as_zero() -> None:
+    near = Thresholds(0.05, 7.6e-6)
+    assert threshold_status(near, near) == "T 0.0500, Ts 0.00001: final."
+    assert "i = 0.85070 ≥ Ts = 0.00001" in explain(0.8507, 0.85, near, "a")
+    zero = Thresholds(0.05, 0)
+    assert threshold_status(zero, zero) == "T 0.0500, Ts 0.0000: final."

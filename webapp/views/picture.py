@@ -126,7 +126,8 @@ class PictureView:
         left = f" ({out} left out)" if out else ""
         self._name.content = (
             f'<div style="{INDENT};font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
-            f"&nbsp;{K} images{left}, {H} rows × {W} columns &nbsp;<b>{escape(Path(file).name)}</b></div>"
+            f"&nbsp;{K} images{left}, {H} rows × {W} columns "
+            f"&nbsp;<b>{escape(Path(file).name)}</b></div>"
         )
 
     def _read_image(self) -> int:
