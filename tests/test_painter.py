@@ -490,3 +490,8 @@ def test_how_often_is_compared_by_both_methods(painter: Painter, canvas: FakeCan
     painter.paint(compose(Runs(STACK, Options()), results, state), None, rested=True)  # pyright: ignore
     expected = render_often(count_classes(other.labels, Factor.SPECULAR), STACK.mask)
     assert np.array_equal(canvas.take()["other png"], expected)
+
+
+def test_only_what_shows_the_input_is_called_brighter() -> None:
+    assert render_layer(frame(gain=2.0))[1] == "input, shown 2 times brighter"
+    assert render_layer(frame(gain=2.0, layer="labels"))[1] == "labels"

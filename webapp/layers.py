@@ -38,7 +38,8 @@ def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
         return render_often(frame.often, stack.mask), caption
     if frame.analysis is None or state.layer not in SIGNED:
         gain = state.gain or 1.0
-        shown = "" if gain == 1 else f", shown {gain:g} times brighter"
+        plain = gain == 1 or state.layer == "labels"  # which hide the picture
+        shown = "" if plain else f", shown {gain:g} times brighter"
         return render_input(stack.images[state.image], gain), f"{state.layer}{shown}"
     signed = frame.analysis.linearized(state.image)
     if state.layer == "linearized":
