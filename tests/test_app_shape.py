@@ -285,6 +285,8 @@ def test_three_clicks_on_the_rim_and_five_on_the_sphere_give_its_shape(
     assert session._read().layer == "relit"
     assert shape.resolved.kind == "points"
     wait_for_text(page, "resolved by 5 points of known normal")
+    push(page, "normals")
+    wait_until(lambda: session._read().layer == "normals")
     sphere = on_sphere() & np.isfinite(shape.albedo)
     cosines = (shape.normals * SCENE.truth.normals).sum(axis=2)[sphere].clip(-1, 1)
     mean = float(np.degrees(np.arccos(cosines)).mean())

@@ -50,7 +50,7 @@ def nothing(*_: object) -> None:
 @pytest.fixture
 def view() -> Iterator[ShapeView]:
     server = open_server(port=0)
-    made = ShapeView(server.server.gui, STACK, nothing, nothing, nothing, nothing)
+    made = ShapeView(server.server.gui, STACK, nothing, nothing, nothing, nothing, nothing)
     made.see(True)
     yield made
     server.stop()
@@ -201,7 +201,7 @@ def test_doubts_of_a_shape_ask_for_attention(view: ShapeView) -> None:
 def test_lights_of_the_stack_are_offered_first_where_there_are_some() -> None:
     lit = replace(STACK, lights=np.random.default_rng(0).normal(size=(9, 3)))
     server = open_server(port=0)
-    view = ShapeView(server.server.gui, lit, nothing, nothing, nothing, nothing)
+    view = ShapeView(server.server.gui, lit, nothing, nothing, nothing, nothing, nothing)
     assert view.given_lights()
     view._known.value = NOTHING
     assert not view.given_lights()
@@ -212,7 +212,7 @@ def test_many_lights_are_not_drawn_unless_asked_for(view: ShapeView) -> None:
     assert view.read(ViewState()).arrows
     many = render_scene("sphere_obstacles", size=(24, 32), images=MANY + 1).stack
     server = open_server(port=0)
-    other = ShapeView(server.server.gui, many, nothing, nothing, nothing, nothing)
+    other = ShapeView(server.server.gui, many, nothing, nothing, nothing, nothing, nothing)
     assert not other.read(ViewState()).arrows
     server.stop()
 

@@ -123,7 +123,9 @@ class Panels:
             canvas.second.on_divide(self.compare.divide)
         with tabs.add_tab("Shape", viser.Icon.CUBE):
             retry = (actions.recover, actions.retract)
-            self.shape = ShapeView(gui, stack, changed, *retry, canvas.set_sketch)
+            self.shape = ShapeView(
+                gui, stack, changed, *retry, canvas.set_sketch, self.picture.show
+            )
             clicks.see("shape", self.shape.see)
             self.run.add_progress(gui)
         with tabs.add_tab("Export", viser.Icon.DOWNLOAD):

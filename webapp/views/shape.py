@@ -16,7 +16,7 @@ from ..live import is_behind
 from ..pointed import FIRST, ON, RIM
 from ..readout import describe_shape, doubt_shape, escape, shape_status
 from ..sketch import Sketch
-from ..state import Pixel, ViewState
+from ..state import SURFACE, Layer, Pixel, ViewState
 from ..values import choose_option, clamp_number, set_longest
 from . import ATTENTION, INDENT
 from .sphere import LARGEST, SphereView
@@ -64,8 +64,9 @@ class ShapeView:
         recover: Callable[[], None],
         retract: Callable[[], None],
         show: Callable[[Sketch | None], None],
+        look: Callable[[Layer], None],
     ) -> None:
-        """Build it; `retract` and `show` as `SphereView` takes them."""
+        """Build it; `retract` and `show` as `SphereView` takes them, `look` goes to a layer."""
         self._names = stack.names
         kinds = (POINTS, BALL, NORMALS, SOME, NOTHING)
         self._known = gui.add_dropdown(
@@ -94,10 +95,25 @@ class ShapeView:
         self._arrows = gui.add_checkbox(
             "lights", len(stack.images) <= MANY, hint="In 3D, as arrows; orange: of this image"
         )
-        self._bind(changed, recover)
+        self._layers = gui.add_button_group(
+            "Look at",
+            SURFACE,
+            visible=False,  # until there is a shape
+            hint="What of the shape the picture shows; View in the tab Tune too",
+        )
+        self._bind(changed, recover, look)
         self._arrange()
 
-    def _bind(self, changed: Callable[[], None], recover: Callable[[], None]) -> None:
+    def _bind(
+        self,
+        changed: Callable[[], None],
+        recover: Callable[[], None],
+        look: Callable[[Layer], None],
+    ) -> None:
+        @self._layers.on_click
+        async def _(_: viser.GuiEvent) -> None:
+            look(choose_option(self._layers.value, SURFACE, "relit"))
+
         for handle in (self._relief, self._arrows):
             handle.disabled = True  # until there is a shape
 
@@ -190,6 +206,8 @@ class ShapeView:
         self._note.content = f'<div id="{ID}">{attention}{note}</div>'
         for handle in (self._relief, self._arrows):
             handle.disabled = found is None
+        if self._layers.visible == (found is None):
+            self._layers.visible = found is not None
 
     def _arrange(self) -> None:
         kind = choose_option(self._known.value, self._known.options, NOTHING)
