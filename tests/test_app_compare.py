@@ -202,7 +202,11 @@ def test_side_by_side_a_click_in_either_view_selects_the_same_pixel(page: Any, a
     wait_until(lambda: session._pointing.pixel == (20, 30))
     for n in (0, 1):
         page.locator(".photolin-marker").nth(n).wait_for()
-    rings = [page.locator(".photolin-marker").nth(n).bounding_box() for n in (0, 1)]
+    # in one go: rings are drawn anew with each frame
+    rings = page.evaluate(
+        """() => [...document.querySelectorAll(".photolin-marker")]
+            .map((ring) => ring.getBoundingClientRect().toJSON())"""
+    )
     assert rings[1]["x"] - rings[0]["x"] == pytest.approx(half, abs=1)
     assert rings[0]["x"] + rings[0]["width"] / 2 == pytest.approx(x, abs=1.5)
     click_pixel(page, 10, 11)
