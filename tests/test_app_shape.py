@@ -635,7 +635,7 @@ def test_a_result_with_a_shape_opens_with_it(page: Any, tmp_path: Path) -> None:
     wait_until(lambda: session._read().layer == "depth")
     session._exclude(3)
     wait_until(lambda: session._frame is not None and session._frame.shape is None)
-    session._exclude(3)
+    session._exclude(3, False)
     assert recovered(session).shape is source.shape
     assert "depth" in session._panels.picture._layer.options
     app.stop()

@@ -88,4 +88,6 @@ def test_without_labels_or_values_there_is_no_difference_of_them() -> None:
     other = other_frame(frame)
     assert other is not None
     assert render_difference(frame, other) is None
-    assert render_difference(*pair(layer="input", against="normals")) is None
+    frame, other = pair(layer="input", against="labels")
+    coloured = replace(other, state=replace(other.state, layer="normals"), labels=None)
+    assert render_difference(frame, coloured) is None
