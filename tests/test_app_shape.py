@@ -169,10 +169,18 @@ def recovered(session: Session) -> Recovered:
     return found
 
 
+def set_outline(session: Session) -> None:
+    """Give the sphere's outline, once a sphere is asked for: that begins at the rim."""
+    sphere = session._panels.shape._sphere
+    wait_until(lambda: sphere.pointed.wanted is not None)
+    sphere.set((59.5, 79.5, RADIUS))
+
+
 def recover(page: Any, session: Session) -> Recovered:
     """A shape by all pixels of the sphere."""
     session._panels.shape._known.value = "a whole sphere"
-    session._panels.shape._sphere.set((59.5, 79.5, RADIUS))
+    set_outline(session)
+    session._panels.shape._sphere.press("select")  # clicks are for pixels again
     press(page, "n")
     return recovered(session)
 
@@ -489,7 +497,7 @@ def test_what_does_not_work_is_told_in_the_words_of_the_command_line_until_it_is
 ) -> None:
     session = enter(page, open_app())
     ask_for_points(page, session)
-    session._panels.shape._sphere.set((59.5, 79.5, RADIUS))
+    set_outline(session)
     push(page, "points")
     click_all(page, session, ((60, 60), (60, 70), (60, 80), (60, 90), (60, 100)))
     wait_for_text(page, "This did not work")
