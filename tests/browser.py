@@ -119,3 +119,14 @@ def choose(page: Any, handle: Any, option: str) -> None:
 def wait_for_keys(page: Any) -> None:
     """Wait until no widget has the keys, a moment after a click."""
     page.wait_for_function("document.activeElement === document.body")
+
+
+def go_to(page: Any, tab: str) -> None:
+    """Open a tab of the panel; the keys are the picture's again."""
+    page.get_by_role("tab", name=tab, exact=True).click()
+    wait_for_keys(page)
+
+
+def wait_for_text(page: Any, text: str) -> None:
+    """Wait until a text is seen, in one place at least."""
+    page.get_by_text(text).first.wait_for(timeout=10_000)

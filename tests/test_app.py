@@ -24,6 +24,7 @@ from browser import (
     press,
     wait_for_colours,
     wait_for_keys,
+    wait_for_text,
     wait_until,
     widget,
 )
@@ -131,10 +132,6 @@ def number(page: Any, handle: Any) -> float:
 def leave_widgets(page: Any) -> None:
     """Give the keyboard back to the canvas."""
     page.evaluate("document.activeElement.blur()")
-
-
-def wait_for_text(page: Any, text: str) -> None:
-    page.get_by_text(text).first.wait_for(timeout=10_000)
 
 
 def wait_for_part(page: Any, expected: np.ndarray, where: np.ndarray, tolerance: int = 0) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from browser import (
     click_pixel,
+    go_to,
     open_canvas,
     press,
     wait_for_keys,
@@ -50,11 +51,6 @@ def enter(page: Any, app: App, tab: str) -> Session:
     session._panels.thresholds._live.value = False
     go_to(page, tab)
     return session
-
-
-def go_to(page: Any, tab: str) -> None:
-    page.get_by_role("tab", name=tab).click()
-    wait_for_keys(page)
 
 
 def push(page: Any, name: str) -> None:

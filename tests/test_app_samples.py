@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from browser import (
     click_pixel,
+    go_to,
     open_canvas,
     place_of,
     press,
@@ -55,11 +56,6 @@ def enter(page: Any, app: App) -> Session:
     go_to(page, "Samples")
     wait_until(lambda: session._panels.samples._shown)
     return session
-
-
-def go_to(page: Any, tab: str) -> None:
-    page.get_by_role("tab", name=tab).click()
-    wait_for_keys(page)
 
 
 def push(page: Any, row: str, name: str) -> None:

@@ -21,6 +21,7 @@ from browser import (
     screenshot,
     similarity,
     wait_for_colours,
+    wait_for_text,
     wait_until,
     widget,
 )
@@ -261,10 +262,6 @@ def on_screen(page: Any, depth: np.ndarray, pixel: tuple[int, int]) -> np.ndarra
         "[window.__viserMutable.canvas.clientWidth, window.__viserMutable.canvas.clientHeight]"
     )
     return np.array([(x / w + 1) / 2 * width, (1 - y / w) / 2 * height])
-
-
-def wait_for_text(page: Any, text: str) -> None:
-    page.get_by_text(text).first.wait_for(timeout=10_000)
 
 
 # --- what a person does ---

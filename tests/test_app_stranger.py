@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import choose, click_pixel, open_canvas, press, wait_for_keys, wait_until
+from browser import choose, click_pixel, go_to, open_canvas, press, wait_until
 
 from photolin.cli import main
 from photolin.factors import Factor
@@ -69,11 +69,6 @@ def enter(page: Any, app: App) -> Session:
     (session,) = app._sessions.values()
     wait_until(lambda: session._frame is not None and session._frame.analysis is not None, 60)
     return session
-
-
-def go_to(page: Any, tab: str) -> None:
-    page.get_by_role("tab", name=tab, exact=True).click()
-    wait_for_keys(page)
 
 
 def settled(session: Session) -> bool:
