@@ -2,12 +2,29 @@
 
 import functools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed, wait
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import NamedTuple
 
 from .analysis import Cancel, Progress
 from .errors import Cancelled
+
+_background: ContextVar[bool] = ContextVar("background", default=False)
+
+
+@contextmanager
+def in_background() -> Iterator[None]:
+    """Work begun in this thread meanwhile does not stand in the way of that of other threads.
+
+    Its blocks are done by threads of their own, so that they may also wait in `cancel`.
+    """
+    token = _background.set(True)
+    try:
+        yield
+    finally:
+        _background.reset(token)
 
 
 class Talk(NamedTuple):
@@ -60,7 +77,8 @@ def run_blocks(
         if progress is not None:
             progress(stage, 1.0)
     else:
-        futures = [_pool(threads or os.cpu_count() or 1).submit(run, span) for span in ranges]
+        pool = _pool(threads or os.cpu_count() or 1, _background.get())
+        futures = [pool.submit(run, span) for span in ranges]
         try:
             for done, future in enumerate(as_completed(futures), 1):
                 future.result()
@@ -75,6 +93,6 @@ def run_blocks(
 
 
 @functools.cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads shared by all callers: starting them takes longer than a small block of work."""
+def _pool(threads: int, background: bool) -> ThreadPoolExecutor:
+    """Threads shared by callers of a kind: starting them takes longer than a small block of work."""
     return ThreadPoolExecutor(threads, "block")

@@ -13,6 +13,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from .allocator import use_few_arenas
 from .analysis import Options
 from .console import (
     complain,
@@ -121,6 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line (without the program's name) and return its exit status."""
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     mend_streams()
+    use_few_arenas()
     try:
         if arguments == ["--version"]:
             print(f"photolin {program_version()}")

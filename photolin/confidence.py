@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .analysis import Confidence
+from .analysis import Cancel, Confidence
 from .blocks import run_blocks
 from .dimensions import Plane
 from .factorize import orthogonalize
@@ -42,6 +42,7 @@ def measure_confidence(
     thresholds: Thresholds,
     quality: Quality,
     threads: int | None = None,
+    cancel: Cancel | None = None,
 ) -> Confidence:
     """What each pixel and each image rests on.
 
@@ -50,6 +51,9 @@ def measure_confidence(
         bases: (3,H,W)
         labels: (K,H,W)
         margin: (P,) of `linearize`.
+
+    Raises:
+        Cancelled: `cancel` said so.
     """
     K, H, W = stack.shape
     X, flat = stack.images.reshape(K, -1), labels.reshape(K, -1)
@@ -60,7 +64,7 @@ def measure_confidence(
     def work(start: int, stop: int) -> None:
         evidence_rows(X, flat, A, quality.white, Ts, lit, diffuse, spread, start, stop)
 
-    run_blocks(work, H * W, BLOCK, threads=threads)
+    run_blocks(work, H * W, BLOCK, threads=threads, stage="confidence", cancel=cancel)
     lit[~stack.mask.reshape(-1)] = 0
     lead = np.zeros((H, W), np.uint16)
     lead[stack.mask] = margin

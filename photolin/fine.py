@@ -24,9 +24,13 @@ WIDE = 4.0
 """Residual, in units of the noise, that noise may have."""
 
 
-def choose_step(pixels: int, images: int = 24) -> int:
-    """Side of the blocks of pixels that one stands for; 1: all are looked at."""
-    coarse = np.clip(COARSE_PIXELS * 24 / images, min(FEWEST_PIXELS, COARSE_PIXELS), COARSE_PIXELS)
+def choose_step(pixels: int, images: int = 24, fewest: int = FEWEST_PIXELS) -> int:
+    """Side of the blocks of pixels that one stands for; 1: all are looked at.
+
+    Args:
+        fewest: pixels that are left with any number of images, about.
+    """
+    coarse = np.clip(COARSE_PIXELS * 24 / images, min(fewest, COARSE_PIXELS), COARSE_PIXELS)
     return max(1, round(np.sqrt(pixels / coarse)))
 
 

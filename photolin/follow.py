@@ -14,21 +14,19 @@ from .errors import OptionError
 from .factors import Thresholds
 from .label import label_images
 from .refine import refine_coefficients
-from .robust import Quality, linearize_robustly
+from .robust import Effort, Quality, linearize_robustly
 from .sample import Sample, draw_sample
 from .saturation import find_white
 from .stack import ImageStack
 
-PIXELS = 2000
-"""Sampled pixels on which the coefficients are estimated again."""
+PIXELS, FEWEST = 2000, 1000
+"""Sampled pixels on which the coefficients are estimated again: with up to 24 images, and with
+many."""
 ROUNDS = 2
 """Rounds of their refinement: they start nearly right."""
 SAMPLES = 30
 """Most random samples of a pixel: a T far too small would ask for hundreds."""
-SWEEPS = 1
-"""Sweeps of settling ties."""
-REFITS = 3
-"""Rounds of refitting the pixels."""
+QUICK = Effort(rounds=3, sweeps=1, fewest=5000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +44,8 @@ class Ground:
 def prepare_ground(stack: ImageStack, seed: int = 0) -> Ground:
     """Draw the sample of a whole stack, of which parts may then be followed."""
     white = find_white(stack)
-    return Ground(draw_sample(stack, seed, white, PIXELS), white, stack.lights)
+    count = max(PIXELS * 24 // max(24, len(stack.images)), FEWEST)
+    return Ground(draw_sample(stack, seed, white, count), white, stack.lights)
 
 
 def follow_thresholds(
@@ -102,9 +101,7 @@ def follow_thresholds(
         )
         quality = Quality(ground.white, found.noise.absolute)
         talk = Talk(threads, None, cancel)
-        bases, _ = linearize_robustly(
-            images, mask, c, thresholds, quick, quality, talk, REFITS, SWEEPS
-        )
+        bases, _ = linearize_robustly(images, mask, c, thresholds, quick, quality, talk, QUICK)
     labels = label_images(images, bases, c, mask, thresholds, threads=threads)
     seconds = perf_counter() - start
     return Analysis(

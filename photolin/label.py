@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from .analysis import Cancel
 from .blocks import run_blocks
 from .factors import Thresholds
 from .kernels import label_rows
@@ -19,6 +20,7 @@ def label_images(
     thresholds: Thresholds,
     *,
     threads: int | None = None,
+    cancel: Cancel | None = None,
 ) -> NDArray[np.uint8]:
     """Label maps of K images.
 
@@ -30,6 +32,9 @@ def label_images(
 
     Returns:
         (K,H,W) Factor codes, the same as `factors.classify` gives; OUTSIDE where the mask is false.
+
+    Raises:
+        Cancelled: `cancel` said so.
     """
     flat = images.reshape(len(images), -1)
     bases = np.ascontiguousarray(linearized_bases).reshape(3, -1)
@@ -42,5 +47,5 @@ def label_images(
         for k in range(len(flat)):
             label_rows(flat[k], bases, c[k], mask.reshape(-1), T, Ts, labels[k], start, stop)
 
-    run_blocks(work, count, BLOCK, threads=threads)
+    run_blocks(work, count, BLOCK, threads=threads, stage="labels", cancel=cancel)
     return labels.reshape(images.shape)

@@ -78,11 +78,15 @@ def run_stages(stack: ImageStack, options: Options, talk: Talk) -> Analysis:
         )
     with timed("classify", seconds, talk.progress):
         labels = label_images(
-            stack.images, bases, coefficients, stack.mask, thresholds, threads=talk.threads
+            *(stack.images, bases, coefficients, stack.mask, thresholds),
+            threads=talk.threads,
+            cancel=talk.cancel,
         )
     with timed("confidence", seconds, talk.progress):
         confidence = measure_confidence(
-            stack, coefficients, bases, labels, margin, thresholds, quality, talk.threads
+            *(stack, coefficients, bases, labels, margin, thresholds, quality),
+            talk.threads,
+            talk.cancel,
         )
         doubts = (
             *doubt_blackness(suggestion),

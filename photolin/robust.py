@@ -10,7 +10,7 @@ from .analysis import Options
 from .blocks import Talk, run_blocks
 from .consensus import stopping_table
 from .factors import Thresholds
-from .fine import choose_step, fit_fine, thin_out
+from .fine import FEWEST_PIXELS, choose_step, fit_fine, thin_out
 from .kernels import consensus_rows
 from .observations import Observations
 from .refit import ROUNDS, find_clear, refit_bases
@@ -41,6 +41,21 @@ class Quality:
     """Standard deviation of an observation, fraction of full scale."""
 
 
+@dataclass(frozen=True)
+class Effort:
+    """How much is done; less is quicker, and less exact."""
+
+    rounds: int = ROUNDS
+    """Rounds of `refit_bases`."""
+    sweeps: int = SWEEPS
+    """Sweeps of `settle_ties`."""
+    fewest: int = FEWEST_PIXELS
+    """Pixels on which highlights of large pictures of many images are searched for."""
+
+
+THOROUGH = Effort()
+
+
 def linearize_robustly(
     images: NDArray[np.float32],
     mask: NDArray[np.bool_],
@@ -49,17 +64,15 @@ def linearize_robustly(
     options: Options,
     quality: Quality,
     talk: Talk,
-    rounds: int = ROUNDS,
-    sweeps: int = SWEEPS,
+    effort: Effort = THOROUGH,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Linearized bases (3,H,W), NaN where not determined, and margins (P,); see `linearize`.
 
     Args:
         images: (K,H,W)
         mask: (H,W)
-        rounds, sweeps: fewer make it quicker, and less exact.
     """
-    rules = Rules(thresholds.T, thresholds.Ts, options.samples, options.seed, rounds, sweeps)
+    rules = Rules(thresholds.T, thresholds.Ts, options.samples, options.seed, effort)
     box = bound(mask)
     if mask[box].size > CROPPED * mask.size:
         return fit_picture(images, mask, coefficients, quality, rules, talk)
@@ -89,10 +102,7 @@ class Rules:
     """The most samples."""
     seed: int
     """Of all samples."""
-    rounds: int = ROUNDS
-    """Rounds of `refit_bases`."""
-    sweeps: int = SWEEPS
-    """Sweeps of `settle_ties`."""
+    effort: Effort = THOROUGH
 
 
 def fit_picture(
@@ -114,7 +124,7 @@ def fit_picture(
     bright = float(np.quantile(some[some > 0], 0.99)) if (some > 0).any() else 1.0
     noise = quality.noise + LEAST_NOISE * bright
     seen = Observations(images, mask, factors, quality.white, rules.Ts, noise, bright)
-    step = choose_step(count, len(images))
+    step = choose_step(count, len(images), rules.effort.fewest)
     if step == 1:
         bases, lead = fit_together(seen, rules, talk)
     else:
@@ -132,9 +142,9 @@ def fit_together(
     pixels = np.flatnonzero(seen.mask)
     bases = np.zeros(seen.images.shape[1:], np.float32)[None].repeat(3, axis=0)
     lead = fit_alone(seen, pixels, rules, bases, talk.part(0, 0.4))
-    settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel, sweeps=rules.sweeps)
+    settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel, sweeps=rules.effort.sweeps)
     rest = talk.part(0.4, 1)
-    refitted = refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rules.rounds)
+    refitted = refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rules.effort.rounds)
     return refitted, lead
 
 
@@ -151,7 +161,7 @@ def fit_from_thinned(
     )
     alone = fit_alone(seen, doubtful, rules, bases, talk.part(0.8, 1))
     lead.reshape(-1)[doubtful] = alone
-    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful, rules.sweeps)
+    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful, rules.effort.sweeps)
     return settled, lead[seen.mask]
 
 

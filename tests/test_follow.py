@@ -15,9 +15,8 @@ from photolin.factorize import orthogonalize
 from photolin.factors import OUTSIDE, Thresholds
 from photolin.follow import (
     PIXELS,
-    REFITS,
+    QUICK,
     SAMPLES,
-    SWEEPS,
     Ground,
     follow_thresholds,
     prepare_ground,
@@ -27,7 +26,7 @@ from photolin.observations import Observations
 from photolin.pipeline import analyze
 from photolin.refine import refine_coefficients
 from photolin.refit import refit_bases
-from photolin.robust import linearize_robustly
+from photolin.robust import THOROUGH, linearize_robustly
 from photolin.sample import draw_sample
 from photolin.saturation import find_white
 from photolin.settle import settle_ties
@@ -251,7 +250,9 @@ def test_what_makes_it_quick_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(module, "linearize_robustly", spy)
     follow(OTHER)
     follow(OTHER, replace(NEAR, options=replace(NEAR.options, samples=12)))
-    assert asked == [(SAMPLES, REFITS, SWEEPS), (12, REFITS, SWEEPS)]
+    assert asked == [(SAMPLES, QUICK), (12, QUICK)]
+    less = (QUICK.rounds, QUICK.sweeps, QUICK.fewest)
+    assert all(a < b for a, b in zip(less, (THOROUGH.rounds, THOROUGH.sweeps, THOROUGH.fewest), strict=True))
 
 
 # Refusals

@@ -191,3 +191,26 @@ def test_counts_of_an_earlier_frame_are_taken_only_where_they_are_right() -> Non
         found = compose(RUNS, results, changed, before=before)  # pyright: ignore
         assert found.often is not before.often
         assert np.array_equal(found.often, compose(RUNS, results, changed).often)  # pyright: ignore
+
+
+def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
+    """The part that is followed counts by its own labels; the rest as in the last result."""
+    state = ViewState(T=0.2, Ts=0.05, layer="how often", often="lit")
+    preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
+    frame = compose(RUNS, RESULTS, state, preview)
+    assert frame.often is not None
+    lit = (Factor.DIFFUSE, Factor.SPECULAR)
+    last = count_classes(ROBUST.labels, *lit)
+    own = count_classes(preview.analysis.labels, *lit)
+    for row, column in np.ndindex(24, 32):
+        expected = last[row, column]
+        at = (row - 6) // 2, (column - 4) // 2
+        within = 6 <= row < 20 and 4 <= column < 30
+        if within and STACK.mask[row, column] and preview.analysis.mask[at]:
+            expected = own[at]
+        assert frame.often[row, column] == expected
+    assert (frame.often != last).any()
+    again = compose(RUNS, RESULTS, replace(state, image=1), preview, None, frame)
+    assert again.often is frame.often
+    still = compose(RUNS, RESULTS, state, None, None, frame)
+    assert np.array_equal(still.often, compose(RUNS, RESULTS, state).often)  # pyright: ignore

@@ -274,6 +274,6 @@ def test_a_window_of_hardly_any_scale_asks_for_no_more_than_the_picture_has() ->
 def test_a_stack_of_many_images_is_thinned_out_more() -> None:
     few, many = (choose_part((K, 500, 500), None) for K in (12, 96))
     assert few.step == 1
-    assert many.step == 2
+    assert many.step == 3
     rows, columns = (len(range(*s.indices(10**6))) for s in many.place)
     assert 96 * rows * columns <= MOST_OBSERVATIONS

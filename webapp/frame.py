@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from photolin.analysis import Analysis, Method
 from photolin.factors import Thresholds, classify
 from photolin.label import label_images
+from photolin.overview import count_classes
 from photolin.shape.recover import Shape
 from photolin.stack import ImageStack
 
 from .live import Preview
-from .often import count_often
+from .often import CLASSES, count_often
 from .runs import Runs
 from .state import ViewState
 
@@ -95,6 +96,7 @@ def compose(
     )
     if preview is not None and analysis is preview.near and labels is not None:
         labels = preview.paint(labels, state.image)
+    in_view = "how often" in (state.layer, state.against)
     return Frame(
         stack,
         state,
@@ -106,8 +108,8 @@ def compose(
         recovered,
         runs.excluded,
         runs.truth,
-        _count(stack, analysis, state, before, "how often" in (state.layer, state.against)),
-        _count(stack, beside, state, before, state.against == "how often"),
+        _count(stack, analysis, state, before, preview, in_view),
+        _count(stack, beside, state, before, None, in_view and state.against == "how often"),
     )
 
 
@@ -116,17 +118,22 @@ def _count(
     analysis: Analysis | None,
     state: ViewState,
     before: Frame | None,
+    preview: Preview | None,
     in_view: bool,
 ) -> NDArray[np.uint16] | None:
     """What the layer how often shows of one result, where it is in view."""
     if analysis is None or not in_view:
         return None
     wanted = (state.thresholds, state.often)
-    if before is not None and (before.state.thresholds, before.state.often) == wanted:
+    known = before is not None and before.preview is preview
+    if before is not None and known and (before.state.thresholds, before.state.often) == wanted:
         pairs = ((before.analysis, before.often), (before.beside, before.beside_often))
         for result, counts in pairs:
             if result is analysis and counts is not None:
                 return counts
+    if preview is not None and analysis is preview.near:
+        whole = count_often(stack, analysis, analysis.thresholds, state.often)
+        return preview.lay(whole, count_classes(preview.analysis.labels, *CLASSES[state.often]))
     return count_often(stack, analysis, *wanted)
 
 

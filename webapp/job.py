@@ -4,7 +4,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Lock, Thread
 
+from photolin.blocks import in_background
 from photolin.errors import Cancelled
+
+from .courtesy import give_way
 
 
 class Job:
@@ -50,12 +53,15 @@ class Job:
         return self._closed
 
     def stopping(self) -> bool:
-        """Whether what is running has been asked to stop."""
+        """Whether what is running has been asked to stop; asked by the work, which gives way here."""
+        if not self._stop.is_set():
+            give_way()
         return self._stop.is_set()
 
     def _run(self, work: Callable[[], None]) -> None:
         try:
-            self._around(work)
+            with in_background():
+                self._around(work)
         finally:
             with self._lock:
                 self._running = False

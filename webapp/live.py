@@ -1,6 +1,7 @@
 """The linearization that follows the sliders: of what the screen shows, until a run catches up."""
 
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,14 @@ from photolin.stack import ImageStack
 from .canvas import Window
 from .state import ViewState
 
+Value = TypeVar("Value", bound=np.generic)
+
 MOST_PIXELS = 300_000
 """Pixels that are linearized at once, about; more are thinned out."""
 MOST_OBSERVATIONS = 26 * MOST_PIXELS
 """Pixels times images; stacks of many images are thinned out more."""
+ANYWAY = 20_000
+"""Pixels that cost as much as what is done for coefficients and highlights, whatever is shown."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +71,23 @@ class Preview:
 
     def paint(self, labels: NDArray[np.uint8], image: int) -> NDArray[np.uint8]:
         """Labels (H,W) of an image with those of the part laid over them."""
-        part, own = self.part, self.analysis.labels[image]
+        return self.lay(labels, self.analysis.labels[image])
+
+    def lay(self, whole: NDArray[Value], own: NDArray[Value]) -> NDArray[Value]:
+        """Values (H,W) with those (h,w) of the part laid over them, inside the mask of both."""
+        part = self.part
         rows, columns = part.row1 - part.row0, part.column1 - part.column0
-        wide = own.repeat(part.step, axis=0)[:rows].repeat(part.step, axis=1)[:, :columns]
-        painted = labels.copy()
-        painted[part.row0 : part.row1, part.column0 : part.column1] = wide
+        place = slice(part.row0, part.row1), slice(part.column0, part.column1)
+
+        def widen(values: NDArray[Any]) -> NDArray[Any]:
+            wide = values.repeat(part.step, axis=0)[:rows]
+            return wide.repeat(part.step, axis=1)[:, :columns]
+
         # a pixel that stands for its neighbours may lie outside the mask, or they
-        outside = painted == np.uint8(255)
-        painted[outside | ~self.near.mask] = labels[outside | ~self.near.mask]
-        return painted
+        inside = widen(self.analysis.mask) & self.near.mask[place]
+        laid = whole.copy()
+        laid[place] = np.where(inside, widen(own), whole[place])
+        return laid
 
 
 class Live:
@@ -136,7 +149,7 @@ def is_behind(state: ViewState, near: Analysis) -> bool:
 def choose_part(shape: tuple[int, int, int], window: Window | None) -> Part:
     """The part of a stack (K,H,W) worth linearizing: all of a small one, else what is seen."""
     K, H, W = shape
-    most = min(MOST_PIXELS, MOST_OBSERVATIONS // K)
+    most = min(MOST_PIXELS, max(MOST_OBSERVATIONS // K - ANYWAY, ANYWAY))
     if window is None or most >= H * W:
         window = Window(0, H, 0, W, 1.0)
     row0, row1, column0, column1, scale = window

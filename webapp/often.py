@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.analysis import Analysis
+from photolin.analysis import Analysis, Cancel
 from photolin.factors import Factor, Thresholds
 from photolin.label import label_images
 from photolin.overview import count_classes
@@ -32,12 +32,23 @@ def count_often(
     return count_classes(label_all(stack, analysis, thresholds), *CLASSES[often])
 
 
-def label_all(stack: ImageStack, analysis: Analysis, thresholds: Thresholds) -> NDArray[np.uint8]:
-    """(K,H,W) Factor codes of all images by a result's bases and `thresholds`."""
+def label_all(
+    stack: ImageStack, analysis: Analysis, thresholds: Thresholds, cancel: Cancel | None = None
+) -> NDArray[np.uint8]:
+    """(K,H,W) Factor codes of all images by a result's bases and `thresholds`.
+
+    Raises:
+        Cancelled: `cancel` said so.
+    """
     if thresholds == analysis.thresholds:
         return analysis.labels
     return label_images(
-        stack.images, analysis.linearized_bases, analysis.coefficients, stack.mask, thresholds
+        stack.images,
+        analysis.linearized_bases,
+        analysis.coefficients,
+        stack.mask,
+        thresholds,
+        cancel=cancel,
     )
 
 

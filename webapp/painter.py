@@ -49,7 +49,7 @@ class Sheet:
         light = state.light if state.layer == "relit" else None
         look = (frame.excluded, state.image, state.layer, state.gain, result, shape, light)
         if counts(frame):  # of all images, whichever is shown
-            look = (state.layer, frame.analysis, state.thresholds, state.often)
+            look = (state.layer, frame.analysis, frame.preview, state.thresholds, state.often)
         both = None if other is None else mixture(frame, other)
         choice = ENCODINGS.index(state.encoding)
         exact = choice == 1 or (choice == 0 and (frame.stack.mask.size <= LARGE or rested))

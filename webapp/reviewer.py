@@ -161,7 +161,7 @@ class Reviewer:
         if frame is None or frame.analysis is None or not self._is_uncounted(frame):
             return
         stack, T = frame.stack, frame.state.thresholds
-        labels = label_all(stack, frame.analysis, T)
+        labels = label_all(stack, frame.analysis, T, self._job.stopping)
         shares = share_classes(labels, stack.mask, kept_images(frame, self._whole))
         with self._lock:
             self.shares, self._counted = {**self.shares, **shares}, (frame.analysis, T)

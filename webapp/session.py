@@ -12,12 +12,14 @@ from time import monotonic
 
 import viser
 
+from photolin.allocator import give_back
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import Thresholds
 
 from .bench import Bench
 from .canvas import Canvas
+from .courtesy import urgent
 from .desk import Desk
 from .frame import Frame, compose
 from .keeper import Keeper
@@ -38,6 +40,8 @@ STEP = 1.0
 dragged slowly rests now and then."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
+LULL = 5.0
+"""Seconds without work after which memory that is free is given back."""
 PARTING = 2.0
 """Seconds that are waited, at most, for a tab that was closed to keep what it showed."""
 
@@ -215,10 +219,15 @@ class Session:
         rough = False
         while not self._closed.is_set():
             rest = next((rest for rest in (REST, STEP) if not self._rested(rest)), 0.0)
-            self._wake.wait(max(self._changed + rest - monotonic(), 0.01) if rough else None)
+            if rough:
+                self._wake.wait(max(self._changed + rest - monotonic(), 0.01))
+            elif not self._wake.wait(LULL):
+                give_back()
+                self._wake.wait()
             self._wake.clear()
             try:
-                rough = self._round()
+                with urgent():
+                    rough = self._round()
             except Cancelled:
                 rough = True  # overtaken by newer thresholds, which are next
             except Exception as error:
@@ -226,6 +235,7 @@ class Session:
                 self.notices.tell(error)
         if self._saved is not None:  # what was done just before the tab was closed is kept too
             self._keep(self._read(), rested=True)
+        give_back()
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""

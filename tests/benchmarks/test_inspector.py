@@ -27,6 +27,7 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from photolin import analyze, render_scene
+from photolin.allocator import use_few_arenas
 from photolin.analysis import METHODS, Options
 from photolin.factors import Factor
 from webapp.app import App
@@ -43,6 +44,8 @@ LIMIT = 0.15
 MINUTES = float(os.environ.get("MINUTES", "10"))
 TABS = 200
 GROWTH = 1.05
+
+use_few_arenas()  # as the command line does
 
 
 @contextmanager

@@ -216,9 +216,10 @@ class SamplesView(Watched):
         self._plot.content = f'<div id="{self._id}" style="{INDENT}">{plot}</div>'
 
     def _plot_residuals(self, frame: Frame, analysis: Analysis) -> str:
-        """Measured once for each result and Ts."""
+        """Measured once for each result and Ts; while sliders move, the last ones are shown."""
         T, Ts = frame.state.thresholds.T, frame.state.thresholds.Ts
-        if self._residuals is None or self._residuals[:2] != (analysis, Ts):
+        moving = frame.preview is not None
+        if self._residuals is None or (not moving and self._residuals[:2] != (analysis, Ts)):
             found = measure_residuals(frame.stack, analysis, Ts)
             self._residuals = (analysis, Ts, found)
         residuals = self._residuals[2]

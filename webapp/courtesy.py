@@ -1,0 +1,36 @@
+"""Work in the background gives way to what somebody waits for, in all tabs of the program.
+
+The cores are shared by all threads, and so is what is said here: that a tab is following its
+sliders or drawing is known to the whole program.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Condition
+
+LONGEST = 1.0
+"""Seconds after which work goes on all the same: a tab that never rests would else stop it."""
+
+_waited_for = 0
+"""Rounds that tabs are in the middle of."""
+_free = Condition()
+
+
+@contextmanager
+def urgent() -> Iterator[None]:
+    """While this lasts, work that gives way rests."""
+    global _waited_for
+    with _free:
+        _waited_for += 1
+    try:
+        yield
+    finally:
+        with _free:
+            _waited_for -= 1
+            _free.notify_all()
+
+
+def give_way() -> None:
+    """Rest, for a while at most, as long as something urgent is being done."""
+    with _free:
+        _free.wait_for(lambda: not _waited_for, LONGEST)
