@@ -94,5 +94,5 @@ def run_blocks(
 
 @functools.cache
 def _pool(threads: int, background: bool) -> ThreadPoolExecutor:
-    """Threads shared by callers of a kind: starting them takes longer than a small block of work."""
+    """Threads shared by callers of a kind: starting them takes longer than a block of work."""
     return ThreadPoolExecutor(threads, "block")

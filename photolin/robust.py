@@ -143,9 +143,8 @@ def fit_together(
     bases = np.zeros(seen.images.shape[1:], np.float32)[None].repeat(3, axis=0)
     lead = fit_alone(seen, pixels, rules, bases, talk.part(0, 0.4))
     settled = settle_ties(seen, bases, lead, talk.threads, talk.cancel, sweeps=rules.effort.sweeps)
-    rest = talk.part(0.4, 1)
-    refitted = refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rules.effort.rounds)
-    return refitted, lead
+    rest, rounds = talk.part(0.4, 1), rules.effort.rounds
+    return refit_bases(seen, settled, rest.threads, rest.progress, rest.cancel, rounds), lead
 
 
 def fit_from_thinned(
@@ -161,7 +160,8 @@ def fit_from_thinned(
     )
     alone = fit_alone(seen, doubtful, rules, bases, talk.part(0.8, 1))
     lead.reshape(-1)[doubtful] = alone
-    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful, rules.effort.sweeps)
+    sweeps = rules.effort.sweeps
+    settled = settle_ties(seen, bases, alone, talk.threads, talk.cancel, doubtful, sweeps)
     return settled, lead[seen.mask]
 
 

@@ -11,26 +11,26 @@ from threading import Condition
 LONGEST = 1.0
 """Seconds after which work goes on all the same: a tab that never rests would else stop it."""
 
-_waited_for = 0
-"""Rounds that tabs are in the middle of."""
+_urgent: set[object] = set()
+"""One for each round that a tab is in the middle of."""
 _free = Condition()
 
 
 @contextmanager
 def urgent() -> Iterator[None]:
     """While this lasts, work that gives way rests."""
-    global _waited_for
+    own = object()
     with _free:
-        _waited_for += 1
+        _urgent.add(own)
     try:
         yield
     finally:
         with _free:
-            _waited_for -= 1
+            _urgent.remove(own)
             _free.notify_all()
 
 
 def give_way() -> None:
     """Rest, for a while at most, as long as something urgent is being done."""
     with _free:
-        _free.wait_for(lambda: not _waited_for, LONGEST)
+        _free.wait_for(lambda: not _urgent, LONGEST)

@@ -53,7 +53,7 @@ class Job:
         return self._closed
 
     def stopping(self) -> bool:
-        """Whether what is running has been asked to stop; asked by the work, which gives way here."""
+        """Whether what is running has been asked to stop. Work that asks gives way here."""
         if not self._stop.is_set():
             give_way()
         return self._stop.is_set()
