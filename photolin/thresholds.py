@@ -27,6 +27,10 @@ CLEAR = 2.5
 DEEP, FEWEST_DEEP = 0.05, 100
 """How far below 0 an attached shadow is, as a share of the brightest grays, to be one for sure,
 and how many of these show the noise."""
+DEEP_SHARE = 0.001
+"""Share of the observations that have to be so for their level to be told."""
+COVERED = 0.95
+"""Share of them that lie below it; and of the diffuse observations, above it."""
 LOUD = 0.1
 """Such noise, as a share of the brightest grays, from which it is the fit that is wrong."""
 ONE_SIDED = 0.1
@@ -73,7 +77,8 @@ def suggest_from_sample(
     """Thresholds for the stack of a sample; T or Ts given in `options` are kept.
 
     Ts is where the dark mode of the histogram has fallen to the level of the grays above it, and
-    above the noise that attached shadows show after linearizing the sample. T lets pass all but the
+    above the noise and the light from elsewhere that attached shadows show after linearizing the
+    sample. T lets pass all but the
     tail of the residuals seen below the fit (i < l), where highlights cannot be.
 
     Args:
@@ -90,7 +95,9 @@ def suggest_from_sample(
     T, found = options.T, None
     if T is None or options.method == "robust":
         found = linearize_sample(sample, starts, Ts, options, lights, cancel)
-        dark = CLEAR * clipped_noise(sample.images, found)
+        dark = max(
+            CLEAR * clipped_noise(sample.images, found), scattered_light(sample.images, found)
+        )
         if options.Ts is None and dark > Ts:
             Ts = shorten(dark)
             starts = find_starts(sample, Ts, options, lights)
@@ -138,12 +145,38 @@ def clipped_noise(images: NDArray[np.float32], found: Factorization) -> float:
     Args:
         images: (K,M)
     """
-    l, bright = found.coefficients.astype(np.float32) @ found.bases, np.quantile(images, 0.99)
-    deep = images[l < -DEEP * bright]
+    _, deep, bright = split_deep(images, found)
     if deep.size < FEWEST_DEEP:
         return 0.0
     middle, upper = np.quantile(deep, (0.5, 0.8413))
     return float(upper) if middle <= ONE_SIDED * upper and upper < LOUD * bright else 0.0
+
+
+def scattered_light(images: NDArray[np.float32], found: Factorization) -> float:
+    """The level below which deep attached shadows lie, however bright light from elsewhere makes
+    them; 0 where they are too few, or as bright as what is lit: then it is the fit that is wrong.
+
+    A surface turned away from the light gets light from other surfaces and from the room, which
+    the fit takes for none: by it alone, such pixels are undefined wherever they are above Ts.
+
+    Args:
+        images: (K,M)
+    """
+    l, deep, _ = split_deep(images, found)
+    if deep.size < max(FEWEST_DEEP, DEEP_SHARE * images.size):
+        return 0.0
+    lit = images[(l > 0) & (np.abs(images - l) <= FIRST_T * images)]
+    level = float(np.quantile(deep, COVERED))
+    return level if lit.size and level <= np.quantile(lit, 1 - COVERED) else 0.0
+
+
+def split_deep(
+    images: NDArray[np.float32], found: Factorization
+) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
+    """Linearized values (K,M), the observations in deep attached shadows, the brightest grays."""
+    l = found.coefficients.astype(np.float32) @ found.bases
+    bright = float(np.quantile(images, 0.99))
+    return l, images[l < -DEEP * bright], bright
 
 
 def find_starts(

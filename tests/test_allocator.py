@@ -9,7 +9,9 @@ import pytest
 from photolin import allocator as module
 from photolin.allocator import ARENAS, give_back, use_few_arenas
 
-glibc = pytest.mark.skipif(module._glibc("malloc_trim") is None, reason="the C library is not glibc")
+glibc = pytest.mark.skipif(
+    module._glibc("malloc_trim") is None, reason="the C library is not glibc"
+)
 
 HOLD = """
 from pathlib import Path

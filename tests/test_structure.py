@@ -15,7 +15,7 @@ import photolin
 ROOT = Path(__file__).parent.parent
 
 FLOORS = (
-    ("errors", "factors", "stack", "analysis", "observations", "compiling"),
+    ("allocator", "errors", "factors", "stack", "analysis", "observations", "compiling"),
     ("kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic", "command"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine", "saturation"),

@@ -9,12 +9,12 @@ from lambert import lambertian, wrap
 from photolin.analysis import Options
 from photolin.errors import DegenerateError
 from photolin.factorize import NO_NOISE, Factorization
-from photolin.factors import Thresholds
+from photolin.factors import Factor, Thresholds
 from photolin.refine import MIN_T
 from photolin.stack import ImageStack
 from photolin.synthetic import SCENES, render_scene
 from photolin.synthetic.render import Bits
-from photolin.thresholds import Suggestion, clipped_noise, suggest_thresholds
+from photolin.thresholds import Suggestion, clipped_noise, scattered_light, suggest_thresholds
 
 
 def suggest(stack: ImageStack, options: Options | None = None) -> Suggestion:
@@ -57,6 +57,50 @@ def test_faint_light_in_attached_shadows_is_not_taken_for_noise() -> None:
     assert noise_of(np.abs(noise)) == 0
     np.testing.assert_allclose(noise_of(noise.clip(0)), 0.02, rtol=0.1)
     np.testing.assert_allclose(noise_of(3 * noise.clip(0)), 3 * noise_of(noise.clip(0)))
+
+
+def light_of(shadows: np.ndarray, lit: np.ndarray) -> float:
+    """The Ts that these attached shadows (3,M) ask for beside lit pixels (3,N)."""
+    found = Factorization(np.eye(3), np.concatenate([0 * shadows - 0.8, lit], 1), 0, NO_NOISE)
+    return scattered_light(np.concatenate([shadows, lit], axis=1), found)
+
+
+def test_light_from_elsewhere_in_attached_shadows_is_below_the_shadow_level() -> None:
+    rng = np.random.default_rng(0)
+    faint = rng.uniform(0.001, 0.011, (3, 500)).astype(np.float32)
+    lit = rng.uniform(0.02, 0.9, (3, 2000)).astype(np.float32)
+    level = light_of(faint, lit)
+    np.testing.assert_allclose(level, 0.0105, rtol=0.02)  # 95 % of them
+    np.testing.assert_allclose(light_of(2 * faint, 2 * lit), 2 * level, rtol=1e-5)
+    order = rng.permutation(500)
+    assert light_of(faint[:, order], lit) == level
+    assert light_of(0 * faint, lit) == 0
+
+
+def test_attached_shadows_as_bright_as_what_is_lit_say_nothing() -> None:
+    """It is the fit that is wrong there, as in highlights taken for the surface."""
+    rng = np.random.default_rng(0)
+    lit = rng.uniform(0.02, 0.9, (3, 2000)).astype(np.float32)
+    assert light_of(rng.uniform(0.001, 0.5, (3, 500)).astype(np.float32), lit) == 0
+    assert light_of(np.full((3, 500), 0.01, np.float32), lit[:, :0]) == 0
+
+
+def test_few_attached_shadows_say_nothing_of_light_from_elsewhere() -> None:
+    lit = np.random.default_rng(0).uniform(0.02, 0.9, (3, 50_000)).astype(np.float32)
+    assert light_of(np.full((3, 30), 0.01, np.float32), lit) == 0
+    assert light_of(np.full((3, 40), 0.01, np.float32), lit) == 0  # of 150 000 observations
+    assert light_of(np.full((3, 60), 0.01, np.float32), lit) > 0
+
+
+def test_suggested_shadow_level_follows_light_from_elsewhere() -> None:
+    scene = render_scene("sphere_cone", size=(120, 160), images=12)
+    images, shadow = scene.stack.images.copy(), scene.truth.labels == Factor.ATTACHED
+    images[shadow] += np.random.default_rng(1).uniform(0, 0.008, shadow.sum()).astype(np.float32)
+    plain = suggest(scene.stack).thresholds
+    t = suggest(replace(scene.stack, images=images)).thresholds
+    assert plain.Ts < 0.002
+    assert 0.0076 < t.Ts < 0.02
+    assert t.T == pytest.approx(plain.T, abs=0.002)
 
 
 def test_a_fit_that_calls_lit_pixels_shadows_says_nothing_of_the_noise() -> None:
