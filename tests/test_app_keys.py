@@ -95,3 +95,21 @@ def test_notes_end_in_the_page_where_they_end_in_the_session(page: Any, app: App
     page.keyboard.insert_text("bcd")
     wait_until(lambda: session._panels.notes.read() == "a" * (MAX_TEXT - 1) + "b")
     assert page.locator("textarea:visible").input_value() == session._panels.notes.read()
+
+
+def test_keys_are_found_by_their_place_on_keyboards_without_latin_letters(
+    page: Any, app: App
+) -> None:
+    """As on a Greek or Russian one, where the key P says π or з."""
+    session = enter(page, app)
+    first = threshold(session)
+    send = "(options) => document.body.dispatchEvent(new KeyboardEvent('keydown', options))"
+    page.evaluate(send, {"key": "ъ", "code": "BracketRight", "bubbles": True})
+    wait_until(lambda: threshold(session) > first)
+    page.evaluate(send, {"key": "я", "code": "KeyZ", "bubbles": True})
+    wait_until(lambda: threshold(session) == first)
+    page.evaluate(send, {"key": "Я", "code": "KeyZ", "shiftKey": True, "bubbles": True})
+    wait_until(lambda: threshold(session) > first)
+    # a Latin letter is what it says, wherever it lies: Z is where the US have Y
+    page.evaluate(send, {"key": "z", "code": "KeyY", "bubbles": True})
+    wait_until(lambda: threshold(session) == first)

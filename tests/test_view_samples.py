@@ -194,3 +194,23 @@ def test_samples_stay_with_their_image_when_others_are_left_out() -> None:
     tab.show(1, excluded=(3, 0))
     assert tab.boxes[-1] == ()
     assert {sample.image for sample in tab.view._samples} == {3}
+
+
+def test_samples_of_images_that_are_left_out_count_again_once_these_are_back() -> None:
+    tab = Tab()
+    tab.view._do("shadow", START)
+    tab.show(3)
+    tab.view.take_box(BOX)
+    tab.show(1)
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    both = tab.view._level
+    assert "Shadows: 84 pixels in 2 samples" in tab.told
+    tab.show(1, excluded=(3,))
+    assert "Shadows: 42 pixels in 1 sample" in tab.told
+    assert tab.view._level is not None
+    tab.show(1, excluded=(1, 3))
+    assert tab.view._level is None
+    assert tab.view._set_Ts.disabled
+    tab.show(1)
+    assert tab.view._level == both

@@ -75,17 +75,27 @@ function openInput({
   const isChord = (event) =>
     (event.ctrlKey || event.metaKey || event.altKey) && !event.getModifierState("AltGraph");
 
+  /** What a key says; on a keyboard without Latin letters, what it says on one of the US. */
+  function latin({ key, code, shiftKey }) {
+    const letter = /^Key([A-Z])$/.exec(code)?.[1];
+    const plain = key.charCodeAt(0) < 0x250; // Latin letters with all their marks
+    if (plain) return key;
+    if (letter) return shiftKey ? letter : letter.toLowerCase();
+    return { BracketLeft: "[{", BracketRight: "]}" }[code]?.[Number(shiftKey)] ?? key;
+  }
+
   function onKey(event) {
     if (isChord(event) || isForWidget(event)) return;
     if (event.key === "Escape" && cards.closeKeys()) return;
-    const action = local[event.key.toLowerCase()];
-    const reported = event.key.length === 1 || /^(Arrow.*|Escape)$/.test(event.key);
+    const key = latin(event);
+    const action = local[key.toLowerCase()];
+    const reported = key.length === 1 || /^(Arrow.*|Escape)$/.test(key);
     if (!action && !reported) return;
     if (isList(event.target)) {
       event.stopPropagation(); // it would open again
       giveFocusBack();
     }
-    if (!action) return event.repeat && !STEPS.test(event.key) ? undefined : report(keyId, event.key);
+    if (!action) return event.repeat && !STEPS.test(key) ? undefined : report(keyId, key);
     event.preventDefault();
     if (!event.repeat && camera.placed()) action();
   }

@@ -85,6 +85,7 @@ class CloudView(Watched):
         self._build(gui)
 
     def _build(self, gui: viser.GuiApi) -> None:
+        self._lights = gui.add_html("")
         self._source = gui.add_dropdown(
             "Solved from",
             SOURCES,
@@ -99,7 +100,6 @@ class CloudView(Watched):
         self._html = gui.add_html(f'<div id="{self._id}"></div>')
         self._turn = gui.add_slider("Turn", -180, 180, 1, FIRST.azimuth, hint="Or drag the cube")
         self._tilt = gui.add_slider("Tilt", -90, 90, 1, FIRST.elevation, hint="Or drag the cube")
-        self._lights = gui.add_html("")
         for handle in (self._source, self._count, self._turn, self._tilt, self._zoom):
 
             @handle.on_update

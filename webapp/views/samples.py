@@ -200,7 +200,8 @@ class SamplesView(Watched):
     def _show(self, frame: Frame) -> None:
         """Draw both histograms and say what they stand for."""
         now = frame.state.thresholds
-        samples = self._samples
+        gone = frame.excluded  # what lies in images that are left out has no say
+        samples = tuple(s for s in self._samples if s.image not in gone)
         shadows, lit = (pool_samples(samples, kind) for kind in NAMES)
         self._level = level = sample_shadow_level(shadows, lit) if shadows.size else None
         told = [*tell_sampling(self._picking, samples, self._note)]

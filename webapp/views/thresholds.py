@@ -124,19 +124,21 @@ class ThresholdView:
         return self._history.now != thresholds
 
     def undo(self) -> None:
-        """Go back to where the sliders rested before."""
-        self._go(self._history.undo())
+        """Go back to where the sliders rested before, also where they do not rest yet."""
+        self._go(lambda history: history.undo())
 
     def redo(self) -> None:
         """Take back an undo."""
-        self._go(self._history.redo())
+        self._go(lambda history: history.redo())
 
     def reset(self) -> None:
         """Go to T and Ts of the first result; can be undone."""
         self.set(self._first)
 
-    def _go(self, history: History[Thresholds]) -> None:
-        if history.now != self._history.now:
+    def _go(self, step: Callable[[History[Thresholds]], History[Thresholds]]) -> None:
+        now = self.read(ViewState()).thresholds
+        history = step(self._history.settle(now))
+        if history.now != now:
             self._history = history
             self.set(history.now)
 
