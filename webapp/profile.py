@@ -123,8 +123,8 @@ def tabulate_pixel(
         )
     heads = ("image", "i", "l", "|i-l|/i", "", "rule")
     return (
-        '<div style="max-height:max(16em,45vh);overflow-y:auto"><table style="border-collapse:collapse;'
-        'font-size:0.75em;text-align:right;font-variant-numeric:tabular-nums;width:100%">'
+        '<div style="max-height:max(16em,45vh);overflow-y:auto">'
+        '<table style="border-collapse:collapse;font-size:0.75em;text-align:right;font-variant-numeric:tabular-nums;width:100%">'
         f"<tr>{''.join(f'<th>{escape(h)}</th>' for h in heads)}</tr>{''.join(rows)}</table></div>"
     )
 

@@ -17,8 +17,8 @@ double click look from the front again.
 
 {keys}
 
-**Live.** While it is on, everything is linearized again as a slider moves: a *preview* of what is on
-screen at once, the *final* result of the whole stack when the slider rests. With *live* off the
+**Live.** While it is on, everything is linearized again as a slider moves: a *preview* of what is
+on screen at once, the *final* result of the whole stack when the slider rests. With *live* off the
 labels alone follow until you linearize again.
 
 **Views.** *input* is the photograph, *linearized* what it would be with diffuse reflection alone
@@ -41,8 +41,8 @@ light from the camera and its rim light from the side. *3D* lays the picture on 
 at a line that you drag on the picture, side by side with one zoom for both, as a difference, or in
 turn (key B). Tables tell how many labels differ. *Export* draws the figures of the paper.
 
-**Units.** Intensities are fractions of full scale; pixels are (row, column) from the upper left corner; in
-space x is right, y up, z to the camera.
+**Units.** Intensities are fractions of full scale; pixels are (row, column) from the upper left
+corner; in space x is right, y up, z to the camera.
 """.replace("{keys}", tabulate_keys())
 
 
