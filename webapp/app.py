@@ -2,17 +2,18 @@
 
 import warnings
 import webbrowser
-from threading import Lock
+from threading import Lock, Timer
 
 import viser
 
+from photolin.allocator import give_back
 from photolin.errors import PhotolinError
 
 from .access import Server, open_server
 from .keeper import Keeper
 from .saved import Saved
 from .selections import Selections
-from .session import Session
+from .session import LULL, Session
 from .source import Source
 from .start import leave_out, start_from
 
@@ -30,6 +31,8 @@ class App:
         self._selections = Selections(source)
         self._selections.without(source.reading.exclude)  # kept for the first tab
         self._sessions: dict[int, Session] = {}
+        self._tidy = Timer(LULL, give_back)
+        """Gives back the memory of tabs that were closed; not started while none was."""
         self._lock = Lock()
         self._untold: list[str] = []
         """What is to be said to the next tab, as there was none."""
@@ -45,6 +48,7 @@ class App:
         with self._lock:
             sessions = list(self._sessions.values())
             self._sessions.clear()
+            self._tidy.cancel()
         for session in sessions:
             session.close()
         for session in sessions:
@@ -92,6 +96,10 @@ class App:
     def _detach(self, client: viser.ClientHandle) -> None:
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
+            self._tidy.cancel()  # one for all tabs that are closed together
+            self._tidy = Timer(LULL, give_back)
+            self._tidy.daemon = True
+            self._tidy.start()
         if session is not None:
             session.close()
 

@@ -124,7 +124,8 @@ def tabulate_pixel(
     heads = ("image", "i", "l", "|i-l|/i", "", "rule")
     return (
         '<div style="max-height:max(16em,45vh);overflow-y:auto">'
-        '<table style="border-collapse:collapse;font-size:0.75em;text-align:right;font-variant-numeric:tabular-nums;width:100%">'
+        '<table style="border-collapse:collapse;width:100%;text-align:right;'
+        'font-size:0.75em;font-variant-numeric:tabular-nums">'
         f"<tr>{''.join(f'<th>{escape(h)}</th>' for h in heads)}</tr>{''.join(rows)}</table></div>"
     )
 

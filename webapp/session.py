@@ -235,7 +235,6 @@ class Session:
                 self.notices.tell(error)
         if self._saved is not None:  # what was done just before the tab was closed is kept too
             self._keep(self._read(), rested=True)
-        give_back()
 
     def _read(self) -> ViewState:
         """The state that all widgets together stand for."""

@@ -7,7 +7,6 @@ connections without a browser, so that only the server is measured. MINUTES in t
 shortens the random use.
 """
 
-import gc
 import os
 import threading
 import time
@@ -32,7 +31,7 @@ from photolin.analysis import METHODS, Options
 from photolin.factors import Factor
 from webapp.app import App
 from webapp.canvas import Window
-from webapp.session import Session
+from webapp.session import LULL, Session
 from webapp.source import Source
 from webapp.state import LAYERS, SURFACE
 from webapp.viser_internals import SUBPROTOCOL
@@ -180,8 +179,8 @@ def see_all(session: Session) -> None:
 
 
 def resident() -> float:
-    """MB of memory in use."""
-    gc.collect()
+    """MB of memory in use, some seconds after the last tab was closed."""
+    time.sleep(2 * LULL)
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmRSS:")[1].split()[0]) / 1024
 

@@ -86,6 +86,7 @@ class CloudView(Watched):
 
     def _build(self, gui: viser.GuiApi) -> None:
         self._lights = gui.add_html("")
+        gui.add_markdown("**How the coefficients of the image shown were found**")
         self._source = gui.add_dropdown(
             "Solved from",
             SOURCES,
