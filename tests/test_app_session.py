@@ -170,3 +170,24 @@ def test_the_copied_command_makes_what_is_on_screen(
     assert download.value.suggested_filename == "scene_report.html"
     assert "&lt;b&gt;mine&lt;/b&gt;<br>and more" in told
     assert "--exclude 6" in told
+
+
+def test_memory_is_given_back_when_a_tab_rests_and_after_it_is_closed(
+    page: Any, open_app: OpenApp, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[str] = []
+    for module in ("app", "session"):
+        monkeypatch.setattr(f"webapp.{module}.LULL", 0.5)
+        monkeypatch.setattr(f"webapp.{module}.give_back", lambda by=module: given.append(by))
+    session = enter(page, open_app(folder))
+    wait_until(lambda: given[-1:] == ["session"])
+    page.wait_for_timeout(1500)
+    rests = len(given)
+    page.wait_for_timeout(1500)
+    assert len(given) == rests  # once for each rest
+    press(page, "ArrowRight")
+    wait_until(lambda: session._read().image == 1)
+    wait_until(lambda: len(given) > rests)
+    assert "app" not in given
+    page.close()
+    wait_until(lambda: given[-1] == "app")
