@@ -117,6 +117,12 @@ def test_a_copy_and_a_saturated_image_are_flagged_and_left_out(page: Any, app: A
         assert np.array_equal(found.coefficients, expected.coefficients)
         card(page, gone[-1]).get_by_text("left out").wait_for()
     page.get_by_text("12 images, 2 left out").wait_for()
+    page.get_by_role("tab", name="Tune").click()
+    shown = session._read().image
+    session._panels.picture.go(6)
+    page.get_by_text("number 8 of all").wait_for()
+    session._panels.picture.go(shown)
+    page.get_by_role("tab", name="Overview").click()
     press(page, "Shift+K")
     found = result_without(session)
     assert np.array_equal(found.labels, RESULT.labels)

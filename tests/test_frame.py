@@ -12,7 +12,7 @@ from photolin.label import label_images
 from photolin.overview import count_classes
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
-from webapp.frame import compose, pixel_values
+from webapp.frame import Frame, compose, pixel_values
 from webapp.live import Part, Preview, cut
 from webapp.runs import Runs
 from webapp.state import ViewState
@@ -214,3 +214,15 @@ def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
     assert again.often is frame.often
     still = compose(RUNS, RESULTS, state, None, None, frame)
     assert np.array_equal(still.often, compose(RUNS, RESULTS, state).often)  # pyright: ignore
+
+
+@pytest.mark.parametrize(
+    ("image", "excluded", "number"),
+    [(0, (), 0), (5, (), 5), (0, (0,), 1), (2, (0, 4), 3), (3, (4, 0), 5), (1, (0, 1, 3), 4)],
+)
+def test_an_image_keeps_its_number_when_others_are_left_out(
+    image: int, excluded: tuple[int, ...], number: int
+) -> None:
+    frame = Frame(STACK, ViewState(image=image), None, None, None, None, excluded=excluded)
+    left = [k for k in range(8) if k not in excluded]
+    assert frame.number == number == left[image]

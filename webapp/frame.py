@@ -55,6 +55,14 @@ class Frame:
     """The same by the method compared with."""
 
     @property
+    def number(self) -> int:
+        """Number of the image shown among all images, those too that are left out."""
+        number = self.state.image
+        for excluded in sorted(self.excluded):
+            number += excluded <= number
+        return number
+
+    @property
     def shape(self) -> Shape | None:
         """The latest shape; None while there is none."""
         return None if self.recovered is None else self.recovered.shape

@@ -124,10 +124,11 @@ class PictureView:
         file = frame.stack.names[frame.state.image]
         out = len(frame.excluded)
         left = f" ({out} left out)" if out else ""
+        number = f", number {frame.number} of all" if out else ""
         self._name.content = (
             f'<div style="{INDENT};font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
             f"&nbsp;{K} images{left}, {H} rows × {W} columns "
-            f"&nbsp;<b>{escape(Path(file).name)}</b></div>"
+            f"&nbsp;<b>{escape(Path(file).name)}</b>{number}</div>"
         )
 
     def _read_image(self) -> int:

@@ -139,7 +139,7 @@ class SamplesView(Watched):
         if kind is None or frame is None:
             return False
         found = take_sample(frame.stack, kind, frame.state.image, box)
-        sample = None if found is None else replace(found, image=number_of(frame))
+        sample = None if found is None else replace(found, image=frame.number)
         if sample is None:
             self._note = OUTSIDE
         elif len(self._samples) >= MOST_SAMPLES:
@@ -183,7 +183,7 @@ class SamplesView(Watched):
         super().draw(frame)
         kind = self._sampling()
         here = self._samples if kind is not None else ()
-        boxes = tuple((s.box, COLOURS[s.kind]) for s in here if s.image == number_of(frame))
+        boxes = tuple((s.box, COLOURS[s.kind]) for s in here if s.image == frame.number)
         if (kind, boxes) != self._sketched:
             self._sketched = (kind, boxes)
             self._canvas.set_sampling(None if kind is None else COLOURS[kind])
@@ -228,11 +228,3 @@ class SamplesView(Watched):
         self._set_T.label = f"Set T to {residuals.T:.4f}{passed}"
         self._set_T.disabled = False
         return plot_residuals(residuals.values, residuals.T, T)
-
-
-def number_of(frame: Frame) -> int:
-    """Number of the image shown among all images, those too that are left out."""
-    number = frame.state.image
-    for excluded in sorted(frame.excluded):
-        number += excluded <= number
-    return number
