@@ -16,7 +16,7 @@ from photolin.pipeline import analyze
 from photolin.stack import ImageStack
 from photolin.thresholds import suggest_thresholds
 
-KEPT = 4
+KEPT = 2
 """Results kept for other tabs; a tab keeps its own for as long as it is open."""
 PATIENCE = 0.05
 """Seconds between two looks at whether a tab still wants to wait for its turn."""
