@@ -226,3 +226,18 @@ def test_an_image_keeps_its_number_when_others_are_left_out(
     frame = Frame(STACK, ViewState(image=image), None, None, None, None, excluded=excluded)
     left = [k for k in range(8) if k not in excluded]
     assert frame.number == number == left[image]
+
+
+def test_counts_beside_a_preview_are_not_made_again() -> None:
+    state = ViewState(T=0.2, Ts=0.05, layer="how often", often="lit")
+    state = replace(state, against="how often", beside="statistical")
+    preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
+    before = compose(RUNS, RESULTS, state, preview)
+    again = compose(RUNS, RESULTS, replace(state, image=1), preview, None, before)
+    assert again.often is before.often
+    assert again.beside_often is before.beside_often
+    assert before.beside_often is not None
+    turned = replace(state, method="statistical", beside="robust")
+    found = compose(RUNS, RESULTS, turned, None, None, before)
+    assert found.often is before.beside_often
+    assert not np.array_equal(found.beside_often, before.often)  # pyright: ignore

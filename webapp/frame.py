@@ -133,11 +133,13 @@ def _count(
     if analysis is None or not in_view:
         return None
     wanted = (state.thresholds, state.often)
-    known = before is not None and before.preview is preview
-    if before is not None and known and (before.state.thresholds, before.state.often) == wanted:
-        pairs = ((before.analysis, before.often), (before.beside, before.beside_often))
-        for result, counts in pairs:
-            if result is analysis and counts is not None:
+    if before is not None and (before.state.thresholds, before.state.often) == wanted:
+        pairs = (
+            (before.preview, before.analysis, before.often),
+            (None, before.beside, before.beside_often),
+        )
+        for followed, result, counts in pairs:
+            if result is analysis and followed is preview and counts is not None:
                 return counts
     if preview is not None and analysis is preview.near:
         whole = count_often(stack, analysis, analysis.thresholds, state.often)
