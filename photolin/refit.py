@@ -32,9 +32,8 @@ STILL = 0.1
 GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 LIT, ENOUGH = 12, 50
 """Lit pixels that a window has to have more of to be measured, and windows needed."""
-PATCHES, FEWEST_PATCHES, PATCH = 40, 20, 12
-"""Squares of pixels in which the noise of means is measured, with up to 24 images and with many;
-their side."""
+PATCHES, PATCH = 40, 12
+"""Squares of pixels in which the noise of means is measured."""
 
 
 Tile = tuple[slice, slice]
@@ -181,8 +180,7 @@ def measure_means(
     if not pixels.size:
         return seen.noise / 5
     # multiples of an irrational number: no step that rows of the picture could be in tune with
-    patches = max(PATCHES * 24 // max(24, len(seen.images)), FEWEST_PATCHES)
-    spread = np.arange(patches) * GOLDEN_RATIO % 1
+    spread = np.arange(PATCHES) * GOLDEN_RATIO % 1
     rows, columns = (
         at[:, None] + np.arange(PATCH) - PATCH // 2
         for at in np.divmod(pixels[(spread * len(pixels)).astype(int)], W)

@@ -18,7 +18,11 @@ def test_residuals_are_of_lit_observations_below_the_fit() -> None:
     l = np.stack([a.linearized(k) for k in range(10)])[:, a.determined()]
     i = SCENE.stack.images[:, a.determined()]
     below = (i >= Ts) & (l > i)
-    np.testing.assert_allclose(np.sort(found), np.sort((l - i)[below] / i[below]), atol=1e-5)
+    expected = (l - i)[below] / i[below]
+    # what is equal but for rounding is counted or not, by how a machine adds
+    sure = np.count_nonzero(expected > 1e-5)
+    assert abs(len(found) - len(expected)) <= len(expected) - sure
+    np.testing.assert_allclose(np.sort(found)[-sure:], np.sort(expected)[-sure:], atol=1e-5)
     few = measure_residuals(SCENE.stack, a, Ts, most=5000).values
     assert 100 < few.size < found.size
     assert np.median(few) == pytest.approx(np.median(found), rel=0.2)

@@ -60,6 +60,8 @@ class FakeGui:
     def add_html(self, content: str) -> Handle:
         return Handle(content=content)
 
+    add_markdown = add_html
+
     def add_dropdown(self, _: str, options: Any, initial_value: str, hint: str) -> Handle:
         return Handle(initial_value)
 
