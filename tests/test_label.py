@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from photolin import label as module
+from photolin.errors import Cancelled
 from photolin.factors import OUTSIDE, Factor, Thresholds, classify
 from photolin.label import label_images
 from photolin.synthetic import Scene, render_scene
@@ -64,3 +65,14 @@ def test_the_true_bases_give_the_true_shadows_of_a_clean_scene() -> None:
     true = scene.truth.labels
     for factor in (Factor.ATTACHED, Factor.CAST):
         assert (labels[true == factor] == factor).mean() > 0.999
+
+
+def test_labelling_that_is_cancelled_gives_no_labels(scene: Scene) -> None:
+    bases, c = solution(scene)
+    known = (scene.stack.images, bases, c, scene.stack.mask, Thresholds(0.05, 0.02))
+    with pytest.raises(Cancelled, match="labels was cancelled"):
+        label_images(*known, cancel=lambda: True)
+    asked: list[bool] = []
+    whole = label_images(*known, cancel=lambda: bool(asked.append(True)))
+    assert asked
+    np.testing.assert_array_equal(whole, label_images(*known))
