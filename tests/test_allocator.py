@@ -27,7 +27,7 @@ give_back()
 print(held - before, resident() - before)
 """
 COUNT = """
-import ctypes, threading, time
+import ctypes, threading
 from photolin.allocator import use_few_arenas
 if {few}:
     use_few_arenas()

@@ -25,6 +25,9 @@ STACK = render_scene("sphere_cone", size=(48, 64), images=10).stack
 RESULT = analyze(STACK, Options(T=0.05, Ts=0.02, samples=50))
 
 
+SEND = "(options) => document.body.dispatchEvent(new KeyboardEvent('keydown', options))"
+
+
 @pytest.fixture
 def app(tmp_path: Path) -> Iterator[App]:
     opened = App(Source(STACK, RESULT, RESULT.options, path=tmp_path), port=0)
@@ -62,12 +65,11 @@ def test_a_key_that_is_held_steps_through_images_but_leaves_out_one(page: Any, a
 def test_brackets_that_take_AltGr_are_brackets_and_chords_are_none(page: Any, app: App) -> None:
     session = enter(page, app)
     first = threshold(session)
-    send = "(options) => document.body.dispatchEvent(new KeyboardEvent('keydown', options))"
     chord = {"key": "]", "ctrlKey": True, "altKey": True, "bubbles": True}
-    page.evaluate(send, chord)
+    page.evaluate(SEND, chord)
     page.wait_for_timeout(300)
     assert threshold(session) == first
-    page.evaluate(send, chord | {"modifierAltGraph": True})
+    page.evaluate(SEND, chord | {"modifierAltGraph": True})
     wait_until(lambda: threshold(session) > first)
 
 
@@ -103,13 +105,12 @@ def test_keys_are_found_by_their_place_on_keyboards_without_latin_letters(
     """As on a Greek or Russian one, where the key P says π or з."""
     session = enter(page, app)
     first = threshold(session)
-    send = "(options) => document.body.dispatchEvent(new KeyboardEvent('keydown', options))"
-    page.evaluate(send, {"key": "ъ", "code": "BracketRight", "bubbles": True})
+    page.evaluate(SEND, {"key": "ъ", "code": "BracketRight", "bubbles": True})
     wait_until(lambda: threshold(session) > first)
-    page.evaluate(send, {"key": "я", "code": "KeyZ", "bubbles": True})
+    page.evaluate(SEND, {"key": "я", "code": "KeyZ", "bubbles": True})
     wait_until(lambda: threshold(session) == first)
-    page.evaluate(send, {"key": "Я", "code": "KeyZ", "shiftKey": True, "bubbles": True})
+    page.evaluate(SEND, {"key": "Я", "code": "KeyZ", "shiftKey": True, "bubbles": True})
     wait_until(lambda: threshold(session) > first)
     # a Latin letter is what it says, wherever it lies: Z is where the US have Y
-    page.evaluate(send, {"key": "z", "code": "KeyY", "bubbles": True})
+    page.evaluate(SEND, {"key": "z", "code": "KeyY", "bubbles": True})
     wait_until(lambda: threshold(session) == first)

@@ -5,6 +5,7 @@ import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from photolin.load.exclude import exclude_images
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene, write_scene
 from webapp.app import App
+from webapp.courtesy import give_way
+from webapp.frame import Frame
 from webapp.keeper import NAME, saved_place
 from webapp.session import Session
 from webapp.source import Source
@@ -191,3 +194,23 @@ def test_memory_is_given_back_when_a_tab_rests_and_after_it_is_closed(
     assert "app" not in given
     page.close()
     wait_until(lambda: given[-1] == "app")
+
+
+def test_background_work_rests_while_a_tab_draws(
+    page: Any, open_app: OpenApp, folder: Path
+) -> None:
+    session = enter(page, open_app(folder))
+    draw, rounds, goes_on = session._panels.draw, [], []
+
+    def watched(frame: Frame) -> None:
+        waiter = Thread(target=lambda: (give_way(), goes_on.append(len(rounds))), daemon=True)
+        waiter.start()
+        waiter.join(0.1)
+        rounds.append(waiter.is_alive())
+        draw(frame)
+
+    session._panels.draw = watched
+    press(page, "ArrowRight")
+    wait_until(lambda: bool(rounds))
+    assert all(rounds)  # whoever gives way was still waiting
+    wait_until(lambda: bool(goes_on))

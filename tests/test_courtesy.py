@@ -92,3 +92,29 @@ def test_work_in_the_background_gives_the_same() -> None:
     with in_background():
         run_blocks(work, 100, 7)
     assert squares == [n * n for n in range(100)]
+
+
+def test_a_job_that_rests_between_blocks_does_not_hold_up_a_tab(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its blocks rest in threads of its own, while those of the tab are done."""
+    monkeypatch.setattr(module, "LONGEST", 60.0)
+    job, began, done = Job(lambda work: work(), lambda: None), Event(), []
+
+    def work() -> None:
+        began.set()
+        run_blocks(lambda start, stop: done.append("job"), 8, 1, cancel=job.stopping)
+
+    with urgent():
+        job.start(work)
+        assert began.wait(5)
+        tab = threading.Thread(
+            target=run_blocks, args=(lambda start, stop: done.append("tab"), 8, 1), daemon=True
+        )
+        tab.start()
+        tab.join(5)
+        assert done == ["tab"] * 8
+    for thread in threading.enumerate():
+        if thread.name == "job":
+            thread.join(5)
+    assert done == ["tab"] * 8 + ["job"] * 8

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from photolin.analysis import Options
+from photolin.errors import Cancelled
 from photolin.factors import OUTSIDE, Factor, Thresholds
 from photolin.label import label_images
 from photolin.pipeline import analyze
@@ -82,3 +83,8 @@ def test_shares_are_of_the_mask_and_add_up() -> None:
         inside = labels[k - 100][mask]
         assert share.tolist() == [(inside == f).mean() for f in sorted(Factor)]
         assert share.sum() == pytest.approx(1)
+
+
+def test_labelling_of_all_images_can_be_cancelled() -> None:
+    with pytest.raises(Cancelled, match="labels was cancelled"):
+        label_all(STACK, RESULT, Thresholds(0.1, 0.05), lambda: True)

@@ -10,6 +10,7 @@ from PIL import Image
 
 from photolin.analysis import Options
 from photolin.factors import PALETTE, Factor
+from photolin.follow import follow_thresholds, prepare_ground
 from photolin.load.exclude import exclude_images
 from photolin.overview import count_classes
 from photolin.pipeline import analyze
@@ -19,6 +20,7 @@ from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp import painter as module
 from webapp.frame import Frame, Recovered, compose
+from webapp.live import Part, Preview, cut
 from webapp.often import render_often
 from webapp.painter import Painter, describe, render_layer
 from webapp.render import choose_scale, render_residual
@@ -495,3 +497,18 @@ def test_how_often_is_compared_by_both_methods(painter: Painter, canvas: FakeCan
 def test_only_what_shows_the_input_is_called_brighter() -> None:
     assert render_layer(frame(gain=2.0))[1] == "input, shown 2 times brighter"
     assert render_layer(frame(gain=2.0, layer="labels"))[1] == "labels"
+
+
+def test_how_often_is_drawn_anew_where_the_preview_looks_at_another_part(
+    painter: Painter, canvas: FakeCanvas
+) -> None:
+    state = ViewState(T=0.2, Ts=0.05, layer="how often", often="lit")
+    runs, ground, shown = Runs(STACK, Options()), prepare_ground(STACK), []
+    for part in (Part(0, 12, 0, 32, 2), Part(12, 24, 0, 32, 2)):
+        own = follow_thresholds(*cut(STACK, part), ground, RESULT, state.thresholds)
+        composed = compose(runs, {"robust": RESULT}, state, Preview(own, part, RESULT))
+        painter.paint(composed, None, rested=True)
+        assert composed.often is not None
+        shown.append(canvas.take()["base png"])
+        assert np.array_equal(shown[-1], render_often(composed.often, STACK.mask))
+    assert not np.array_equal(*shown)

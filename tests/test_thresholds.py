@@ -103,6 +103,16 @@ def test_suggested_shadow_level_follows_light_from_elsewhere() -> None:
     assert abs(t.T - plain.T) < 0.002
 
 
+@pytest.mark.parametrize("name", ["pot", "sphere_obstacles"])
+def test_light_that_no_histogram_shows_is_told_by_attached_shadows_alone(name: str) -> None:
+    """Light of all levels up to 0.06 has no mode; by the histogram Ts would be near its floor."""
+    scene = render_scene(name, size=(120, 160), images=24)
+    images, shadow = scene.stack.images.copy(), scene.truth.labels == Factor.ATTACHED
+    images[shadow] += np.random.default_rng(1).uniform(0, 0.06, shadow.sum()).astype(np.float32)
+    t = suggest(replace(scene.stack, images=images.clip(0, 1))).thresholds
+    assert 0.054 < t.Ts < 0.06
+
+
 def test_a_fit_that_calls_lit_pixels_shadows_says_nothing_of_the_noise() -> None:
     lit = np.random.default_rng(0).normal(0, 0.5, (3, 500)).clip(0, 1).astype(np.float32)
     assert noise_of(lit) == 0

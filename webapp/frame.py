@@ -16,6 +16,7 @@ from photolin.stack import ImageStack
 from .live import Preview
 from .often import CLASSES, count_often
 from .runs import Runs
+from .selections import left_images
 from .state import ViewState
 
 
@@ -57,10 +58,8 @@ class Frame:
     @property
     def number(self) -> int:
         """Number of the image shown among all images, those too that are left out."""
-        number = self.state.image
-        for excluded in sorted(self.excluded):
-            number += excluded <= number
-        return number
+        count = len(self.stack.images) + len(self.excluded)
+        return left_images(count, self.excluded)[self.state.image]
 
     @property
     def shape(self) -> Shape | None:

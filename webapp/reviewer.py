@@ -16,6 +16,7 @@ from photolin.stack import ImageStack
 from .frame import Frame
 from .job import Job
 from .often import label_all, share_classes
+from .selections import left_images
 from .strip import Health, judge
 from .thumbnails import Sheet, make_sheet
 
@@ -179,5 +180,4 @@ def reviewed_of(frame: Frame) -> Analysis | None:
 
 def kept_images(frame: Frame, whole: ImageStack) -> list[int]:
     """Numbers in the whole stack of the images of a frame."""
-    gone = set(frame.excluded)
-    return [k for k in range(len(whole.images)) if k not in gone]
+    return left_images(len(whole.images), frame.excluded)
