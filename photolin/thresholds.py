@@ -99,7 +99,7 @@ def suggest_from_sample(
             CLEAR * clipped_noise(sample.images, found), scattered_light(sample.images, found)
         )
         if options.Ts is None and dark > Ts:
-            Ts = shorten(dark)
+            Ts = shorten_above(dark)
             starts = find_starts(sample, Ts, options, lights)
             found = linearize_sample(sample, starts, Ts, options, lights, cancel)
     if T is None:
@@ -190,4 +190,16 @@ def find_starts(
 
 def shorten(level: float) -> float:
     """Rounded to four decimals, or to two digits where that is finer, as on very dark stacks."""
-    return float(round(level, max(4, 1 - floor(log10(level))))) if level > 0 else 0.0
+    return float(round(level, _decimals(level))) if level > 0 else 0.0
+
+
+def shorten_above(level: float) -> float:
+    """The same, upwards and never the level itself: grays that have it are below the result."""
+    decimals = _decimals(level)
+    # a tenth of a step apart at least, which single precision tells
+    steps = floor(level * 10**decimals + 0.1) + 1
+    return float(round(steps / 10**decimals, decimals))
+
+
+def _decimals(level: float) -> int:
+    return max(4, 1 - floor(log10(level)))

@@ -114,3 +114,18 @@ def test_keys_are_found_by_their_place_on_keyboards_without_latin_letters(
     # a Latin letter is what it says, wherever it lies: Z is where the US have Y
     page.evaluate(SEND, {"key": "z", "code": "KeyY", "bubbles": True})
     wait_until(lambda: threshold(session) == first)
+    page.evaluate(SEND, {"key": "؟", "code": "Slash", "shiftKey": True, "bubbles": True})
+    page.get_by_text("undo, redo a change of T or Ts").wait_for()  # the list of keys
+
+
+def test_what_AltGr_types_is_no_key_of_the_tool(page: Any, app: App) -> None:
+    session = enter(page, app)
+    first = threshold(session)
+    press(page, "]")
+    wait_until(lambda: threshold(session) > first)
+    second = threshold(session)
+    # € at E, say; Z would undo
+    euro = {"key": "€", "code": "KeyZ", "modifierAltGraph": True, "bubbles": True}
+    page.evaluate(SEND, euro)
+    press(page, "]")  # keys are taken in turn
+    wait_until(lambda: threshold(session) > second)

@@ -20,8 +20,9 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.frame import pixel_values
-from webapp.session import Session
+from webapp.session import STEP, Session
 from webapp.source import Source
+from webapp.viser_internals import widget_id
 
 pytestmark = [
     pytest.mark.browser,
@@ -78,6 +79,31 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     wait_until(lambda: session._panels.thresholds._history.now == first)
     press(page, "z")
     wait_until(lambda: session._read().thresholds == seen[2])
+
+
+def test_a_slider_that_rests_while_it_is_dragged_makes_one_step(page: Any, app: App) -> None:
+    session = enter(page, app, "Tune")
+    view, first = session._panels.thresholds, session._read().thresholds
+    handle = page.locator(f"[id='{widget_id(view._T)}'] [role=slider]")
+    box = handle.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    rests = []
+    for x_now in (x + 15, x + 30):
+        page.mouse.move(x_now, y, steps=3)
+        wait_until(lambda: session._rested(STEP) and session._read().thresholds not in rests)
+        rests.append(session._read().thresholds)
+    page.mouse.up()
+    wait_until(lambda: view._history.now == rests[-1])
+    assert len({first, *rests}) == 3
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == first)
+    assert not view._history.past
+    assert not view.settle(first, True)
+    view.settle(rests[0], True)  # as the worker read it before the undo
+    press(page, "Shift+Z")
+    wait_until(lambda: session._read().thresholds == rests[-1])
 
 
 def test_a_pixel_is_told_in_all_images_beside_pinned_ones(page: Any, app: App) -> None:

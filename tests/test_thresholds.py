@@ -136,6 +136,14 @@ def test_more_noise_gives_a_larger_tolerance() -> None:
     np.testing.assert_allclose(T, [MIN_T, MIN_T, 0.0281], rtol=0.08)
 
 
+@pytest.mark.parametrize("level", [25, 28])
+def test_shadows_that_all_have_one_gray_are_below_the_shadow_level(level: int) -> None:
+    """Of 8 bits: between two levels of four decimals, of which only the upper one covers them."""
+    stack = render_scene("sphere_cone", images=24, ambient=level / 255, bits=8).stack
+    Ts = suggest(stack).thresholds.Ts
+    assert np.float32(level / 255) < np.float32(Ts) < np.float32((level + 1) / 255)
+
+
 def test_an_ambient_level_lifts_the_shadow_level_over_it() -> None:
     level = suggest(render_scene("sphere_cone", ambient=0.03).stack, Options(T=0.05))
     assert 0.03 < level.thresholds.Ts < 0.06

@@ -69,9 +69,9 @@ class Canvas:
         )
         # viser has no events for hovering and keys, and its clicks miss by half a CSS pixel on
         # screens with more than one pixel in it: the page writes them into hidden fields.
-        self._hover, self._pick, self._key, self._view, self._light, self._band = (
+        self._hover, self._pick, self._key, self._view, self._light, self._band, self._hold = (
             client.gui.add_text(name, "", visible=False)
-            for name in ("hover", "pick", "key", "view", "light", "band")
+            for name in ("hover", "pick", "key", "view", "light", "band", "hold")
         )
         self._relief = Relief(client, height, width, WORLD_HEIGHT)
         self.second = Second(client, WORLD_HEIGHT * width / height, WORLD_HEIGHT)
@@ -90,6 +90,7 @@ class Canvas:
             "others": PLANES,
             "dividerId": self.second.divider_id,
             "bandId": widget_id(self._band),
+            "holdId": widget_id(self._hold),
             "keys": [(key.shown, key.does) for key in KEYS],
             "hint": HINT,
             "mostText": MAX_TEXT,
@@ -226,6 +227,13 @@ class Canvas:
         @self._key.on_update
         async def _(_: viser.GuiEvent) -> None:
             callback(self._key.value.partition(" ")[2])
+
+    def on_hold(self, callback: Callable[[bool], None]) -> None:
+        """Call back when the pointer is pressed on a slider, true, and when it is let go of."""
+
+        @self._hold.on_update
+        async def _(_: viser.GuiEvent) -> None:
+            callback(self._hold.value == "held")
 
     def _pixel(self, text: str) -> Pixel | None:
         return pixel_in_text(text, self._shape) or self._relief.pixel_on(text)

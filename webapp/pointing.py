@@ -18,6 +18,8 @@ class Pointing:
         self.pins: tuple[Pixel, ...] = ()
         self.light = ViewState.light
         self.window: Window | None = None
+        self.holding = False
+        """Whether a slider is held: where it stands is not where it is to stay."""
 
     def read(self, state: ViewState) -> ViewState:
         """The state with pixel, pins and light as they are here."""
@@ -58,4 +60,9 @@ class Pointing:
     def see(self, window: Window) -> None:
         """Take the part of the picture that is in view."""
         self.window = window
+        self._changed()
+
+    def hold(self, on: bool) -> None:
+        """Take whether a slider is held."""
+        self.holding = on
         self._changed()

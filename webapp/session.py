@@ -19,7 +19,7 @@ from photolin.factors import Thresholds
 
 from .bench import Bench
 from .canvas import Canvas
-from .courtesy import urgent
+from .courtesy import give_way, urgent
 from .desk import Desk
 from .frame import Frame, compose
 from .keeper import Keeper
@@ -36,8 +36,8 @@ from .theme import set_theme
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
 STEP = 1.0
-"""Seconds without a change after which what follows is another step to undo: a slider that is
-dragged slowly rests now and then."""
+"""Seconds without a change after which what follows is another step to undo. A slider does not rest
+while it is held."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
 LULL = 5.0
@@ -114,6 +114,7 @@ class Session:
         canvas.on_key(self._press)
         canvas.on_view(pointing.see)
         canvas.on_light(pointing.shine)
+        canvas.on_hold(self._hold)
 
     # --- what the work does ---
 
@@ -174,6 +175,10 @@ class Session:
             tell=self.notices.tell,
         )
 
+    def _hold(self, on: bool) -> None:
+        self._changed = monotonic()  # what a slider says last may come after it was let go of
+        self._pointing.hold(on)
+
     def _press(self, key: str) -> None:
         try:
             self._panels.press(key)
@@ -222,6 +227,7 @@ class Session:
             if rough:
                 self._wake.wait(max(self._changed + rest - monotonic(), 0.01))
             elif not self._wake.wait(LULL):
+                give_way()  # other tabs may be busy
                 give_back()
                 self._wake.wait()
             self._wake.clear()
@@ -249,7 +255,9 @@ class Session:
         if frame is None or state != frame.state:
             self._changed = monotonic()
         rested = self._rested(REST)
-        moving = self._panels.thresholds.settle(state.thresholds, self._rested(STEP))
+        holding = pointing.holding  # letting go wakes the worker
+        step = self._rested(STEP) and not holding
+        moving = self._panels.thresholds.settle(state.thresholds, step) and not holding
         bench.work.ensure(state)
         preview = self._follow(state, results)
         recovered = bench.work.recovered

@@ -76,12 +76,14 @@ function openInput({
     (event.ctrlKey || event.metaKey || event.altKey) && !event.getModifierState("AltGraph");
 
   /** What a key says; on a keyboard without Latin letters, what it says on one of the US. */
-  function latin({ key, code, shiftKey }) {
+  function latin(event) {
+    const { key, code, shiftKey } = event;
     const letter = /^Key([A-Z])$/.exec(code)?.[1];
     const plain = key.charCodeAt(0) < 0x250; // Latin letters with all their marks
-    if (plain) return key;
+    if (plain || event.getModifierState("AltGraph")) return key; // AltGr types €, say, at E
     if (letter) return shiftKey ? letter : letter.toLowerCase();
-    return { BracketLeft: "[{", BracketRight: "]}" }[code]?.[Number(shiftKey)] ?? key;
+    const signs = { BracketLeft: "[{", BracketRight: "]}", Slash: "/?" }[code];
+    return signs?.[Number(shiftKey)] ?? key;
   }
 
   function onKey(event) {

@@ -1,7 +1,8 @@
 // What viser's widgets leave out: typing beyond the ends of a slider, an end of texts, tooltips of
-// buttons, tooltips that go once a widget is used, as one looks at the picture then, the clipboard.
+// buttons, tooltips that go once a widget is used, as one looks at the picture then, how long a slider
+// is held, the clipboard.
 
-function openWidgets({ listen, mostText }) {
+function openWidgets({ listen, send, holdId, mostText }) {
   const reaches = new Map(); // id of a slider -> the most that may be typed into its box
   const titles = new Map(); // id of a button -> its tooltip
 
@@ -41,6 +42,17 @@ function openWidgets({ listen, mostText }) {
     usedAt = null;
     quiet.remove("photolin-quiet");
   }, true);
+
+  let held = false; // the pointer is down on a slider: wherever it rests, it may go on
+
+  function hold(on) {
+    if (on === held) return;
+    held = on;
+    send(holdId, on ? "held" : "");
+  }
+
+  listen(window, "pointerdown", ({ target }) => target.closest?.(".mantine-Slider-root") && hold(true), true);
+  for (const end of ["pointerup", "pointercancel", "blur"]) listen(window, end, () => hold(false), true);
 
   /** Put text on the clipboard, after a click or a key. */
   async function copy(text) {

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import nextafter
+from threading import Lock
 
 import viser
 
@@ -38,6 +39,8 @@ class ThresholdView:
         suggest: Callable[[], None],
         linearize: Callable[[], None],
     ) -> None:
+        self._stepping = Lock()
+        """The worker settles while keys and buttons undo."""
         self._T = gui.add_slider(
             "T",
             *RANGES["T"],
@@ -109,8 +112,9 @@ class ThresholdView:
 
     def begin(self, thresholds: Thresholds) -> None:
         """Move both sliders to where they start, without a step that could be undone."""
-        self._first, self._history = thresholds, History(thresholds)
-        self.set(thresholds)
+        with self._stepping:
+            self._first, self._history = thresholds, History(thresholds)
+            self.set(thresholds)
 
     def restore(self, state: ViewState) -> None:
         """Move the sliders to a state's T and Ts, without a step that could be undone."""
@@ -119,9 +123,11 @@ class ThresholdView:
 
     def settle(self, thresholds: Thresholds, rested: bool) -> bool:
         """Take note of where the sliders have come to rest; whether that is still to come."""
-        if rested:
-            self._history = self._history.settle(thresholds)
-        return self._history.now != thresholds
+        with self._stepping:
+            # what was read before an undo is no step after it
+            if rested and self._present() == thresholds:
+                self._history = self._history.settle(thresholds)
+            return self._history.now != thresholds
 
     def undo(self) -> None:
         """Go back to where the sliders rested before, also where they do not rest yet."""
@@ -136,11 +142,15 @@ class ThresholdView:
         self.set(self._first)
 
     def _go(self, step: Callable[[History[Thresholds]], History[Thresholds]]) -> None:
-        now = self.read(ViewState()).thresholds
-        history = step(self._history.settle(now))
-        if history.now != now:
-            self._history = history
-            self.set(history.now)
+        with self._stepping:
+            now = self._present()
+            history = step(self._history.settle(now))
+            if history.now != now:
+                self._history = history
+                self.set(history.now)
+
+    def _present(self) -> Thresholds:
+        return self.read(ViewState()).thresholds
 
     def set(self, thresholds: Thresholds) -> None:
         """Move both sliders, which end where they did at first or, if need be, there."""
@@ -157,11 +167,11 @@ class ThresholdView:
 
     def set_T(self, T: float) -> None:
         """Move the slider T."""
-        self.set(replace(self.read(ViewState()).thresholds, T=T))
+        self.set(replace(self._present(), T=T))
 
     def set_Ts(self, Ts: float) -> None:
         """Move the slider Ts."""
-        self.set(replace(self.read(ViewState()).thresholds, Ts=Ts))
+        self.set(replace(self._present(), Ts=Ts))
 
     def nudge(self, T: int = 0, Ts: int = 0) -> None:
         """Move a slider by a tenth of its value, at least one step, `T` or `Ts` times."""
