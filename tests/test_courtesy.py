@@ -1,12 +1,14 @@
 """Work in the background rests while a tab draws, and does not stand in its way."""
 
 import threading
+from collections.abc import Callable
 from threading import Event
 
 import pytest
 
 from photolin.blocks import in_background, run_blocks
 from webapp import courtesy as module
+from webapp import job as jobs
 from webapp.courtesy import give_way, urgent
 from webapp.job import Job
 
@@ -46,10 +48,52 @@ def test_a_job_that_is_told_to_stop_does_not_rest_first(monkeypatch: pytest.Monk
     assert found == [True]
 
 
+@pytest.mark.parametrize("end", [Job.stop, Job.close])
+def test_a_job_that_rests_ends_its_rest_when_told_to_stop(
+    end: Callable[[Job], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LONGEST", 60.0)
+    job, asking, stopped = Job(lambda work: work(), lambda: None), Event(), Event()
+
+    def work() -> None:
+        asking.set()
+        assert job.stopping()
+        stopped.set()
+
+    with urgent():
+        job.start(work)
+        assert asking.wait(5)
+        assert not stopped.wait(0.1)
+        end(job)
+        assert stopped.wait(5)
+
+
 def test_a_tab_that_never_rests_does_not_stop_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "LONGEST", 0.05)
     with urgent():
-        give_way()
+        assert not give_way()
+    assert give_way()
+
+
+def test_a_job_that_rested_in_vain_does_not_rest_again_at_each_block(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rests = []
+
+    def rest(ended: Callable[[], bool]) -> bool:
+        assert not ended()
+        rests.append(time)
+        return time >= 8  # the tab has rested
+
+    time = 0.0
+    monkeypatch.setattr(jobs, "give_way", rest)
+    monkeypatch.setattr(jobs, "monotonic", lambda: time)
+    monkeypatch.setattr(jobs, "TURN", 3.0)
+    job = Job(lambda work: work(), lambda: None)
+    for _ in range(10):
+        assert not job.stopping()
+        time += 1
+    assert rests == [0, 3, 6, 9]
 
 
 def test_a_round_that_fails_is_over_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.frame import Frame, compose, pixel_values
 from webapp.live import Part, Preview, cut
+from webapp.often import count_often
 from webapp.runs import Runs
 from webapp.state import ViewState
 
@@ -194,13 +195,15 @@ def test_counts_of_an_earlier_frame_are_taken_only_where_they_are_right() -> Non
 
 
 def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
-    """The part that is followed counts by its own labels; the rest as in the last result."""
+    """The part that is followed counts by its own labels; the rest by the last result's bases and
+    the thresholds of the view, as its labels."""
     state = ViewState(T=0.2, Ts=0.05, layer="how often", often="lit")
     preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
     frame = compose(RUNS, RESULTS, state, preview)
     assert frame.often is not None
     lit = (Factor.DIFFUSE, Factor.SPECULAR)
-    last = count_classes(ROBUST.labels, *lit)
+    last = count_often(STACK, ROBUST, state.thresholds, "lit")
+    assert (last != count_classes(ROBUST.labels, *lit)).any()
     own = count_classes(preview.analysis.labels, *lit)
     for row, column in np.ndindex(24, 32):
         expected = last[row, column]

@@ -142,11 +142,12 @@ def test_a_part_is_cut_out_in_one_piece(part: Part) -> None:
 
 def test_a_preview_of_all_pixels_stands_for_the_whole_result() -> None:
     preview = preview_of(Part(0, H, 0, W, 1))
-    whole, own = preview.whole(), preview.analysis
+    whole, own = preview.whole, preview.analysis
     assert whole is not None
     assert (whole.options, whole.thresholds) == (own.options, MOVED.thresholds)
     for name in ("coefficients", "linearized_bases", "labels", "seconds"):
         assert getattr(whole, name) is getattr(own, name)
+    assert preview.whole is whole  # what is counted and drawn of it is known by it
     for name in ("confidence", "names", "notes", "warnings", "base_images", "mask"):
         assert getattr(whole, name) is getattr(NEAR, name)
     np.testing.assert_array_equal(preview.paint(NEAR.labels[3], 3), own.labels[3])
@@ -156,7 +157,7 @@ def test_a_preview_of_all_pixels_stands_for_the_whole_result() -> None:
     "part", [Part(0, H, 0, W, 2), Part(0, H, 0, W - 1, 1), Part(1, H, 0, W, 1)]
 )
 def test_a_preview_of_a_part_stands_for_no_whole(part: Part) -> None:
-    assert preview_of(part).whole() is None
+    assert preview_of(part).whole is None
 
 
 @pytest.mark.parametrize("image", [0, K - 1])
@@ -277,3 +278,10 @@ def test_a_stack_of_many_images_is_thinned_out_more() -> None:
     assert many.step == 3
     rows, columns = (len(range(*s.indices(10**6))) for s in many.place)
     assert 96 * rows * columns <= MOST_OBSERVATIONS
+
+
+@pytest.mark.parametrize("K", [3, 26, 96, 200, 391, 1000, 10**7])
+def test_no_number_of_images_makes_a_preview_dearer(K: int) -> None:
+    part = choose_part((K, 2000, 3000), None)
+    rows, columns = (len(range(*s.indices(10**6))) for s in part.place)
+    assert rows * columns <= max(1, min(MOST_PIXELS, MOST_OBSERVATIONS // K))

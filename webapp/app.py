@@ -96,12 +96,13 @@ class App:
     def _detach(self, client: viser.ClientHandle) -> None:
         with self._lock:
             session = self._sessions.pop(client.client_id, None)
+            if session is None:  # closed with all others
+                return
             self._tidy.cancel()  # one for all tabs that are closed together
             self._tidy = Timer(LULL, give_back)
             self._tidy.daemon = True
             self._tidy.start()
-        if session is not None:
-            session.close()
+        session.close()
 
 
 def serve(

@@ -4,12 +4,14 @@ The cores are shared by all threads, and so is what is said here: that a tab is 
 sliders or drawing is known to the whole program.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Condition
 
-LONGEST = 1.0
+LONGEST = 0.5
 """Seconds after which work goes on all the same: a tab that never rests would else stop it."""
+TURN = 0.25
+"""Seconds that it then goes on for before it rests again: it takes three times as long at most."""
 
 _urgent: set[object] = set()
 """One for each round that a tab is in the middle of."""
@@ -30,7 +32,20 @@ def urgent() -> Iterator[None]:
             _free.notify_all()
 
 
-def give_way() -> None:
-    """Rest, for a while at most, as long as something urgent is being done."""
+def give_way(ended: Callable[[], bool] = bool) -> bool:
+    """Rest, for a while at most, as long as something urgent is being done.
+
+    Args:
+        ended: whether there is nothing to rest for any more; looked at again by `end_rests`.
+
+    Returns:
+        Whether it was long enough.
+    """
     with _free:
-        _free.wait_for(lambda: not _urgent, LONGEST)
+        return _free.wait_for(lambda: not _urgent or ended(), LONGEST)
+
+
+def end_rests() -> None:
+    """Let all that rest look at whether they are to go on."""
+    with _free:
+        _free.notify_all()

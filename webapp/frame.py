@@ -95,7 +95,7 @@ def compose(
         before: an earlier frame, whose counts over all images are taken where they are right.
     """
     stack, analysis = runs.stack, results.get(state.method)
-    if preview is not None and (whole := preview.whole()) is not None:
+    if preview is not None and (whole := preview.whole) is not None:
         analysis = whole
     beside = results.get(state.beside) if state.beside is not None else None
     labels, beside_labels = (
@@ -141,7 +141,7 @@ def _count(
             if result is analysis and followed is preview and counts is not None:
                 return counts
     if preview is not None and analysis is preview.near:
-        whole = count_often(stack, analysis, analysis.thresholds, state.often)
+        whole = count_often(stack, analysis, *wanted)
         return preview.lay(whole, count_classes(preview.analysis.labels, *CLASSES[state.often]))
     return count_often(stack, analysis, *wanted)
 

@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Lock, Thread
+from time import monotonic
 
 from photolin.blocks import in_background
 from photolin.errors import Cancelled
 
-from .courtesy import give_way
+from .courtesy import TURN, end_rests, give_way
 
 
 class Job:
@@ -26,6 +27,8 @@ class Job:
         self._lock = Lock()
         self._stop = Event()
         self._running = self._closed = False
+        self._working_until = 0.0
+        """Until then it does not rest, as it has rested in vain."""
 
     def start(self, work: Callable[[], None]) -> bool:
         """Start `work` unless some is running; whether it was started."""
@@ -40,12 +43,13 @@ class Job:
     def stop(self) -> None:
         """Ask what is running to stop."""
         self._stop.set()
+        end_rests()
 
     def close(self) -> None:
         """Ask what is running to stop, and start nothing any more."""
         with self._lock:
             self._closed = True
-            self._stop.set()
+        self.stop()
 
     @property
     def closed(self) -> bool:
@@ -54,8 +58,8 @@ class Job:
 
     def stopping(self) -> bool:
         """Whether what is running has been asked to stop. Work that asks gives way here."""
-        if not self._stop.is_set():
-            give_way()
+        if monotonic() >= self._working_until and not give_way(self._stop.is_set):
+            self._working_until = monotonic() + TURN
         return self._stop.is_set()
 
     def _run(self, work: Callable[[], None]) -> None:

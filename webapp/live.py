@@ -1,6 +1,7 @@
 """The linearization that follows the sliders: of what the screen shows, until a run catches up."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -54,6 +55,7 @@ class Preview:
     near: Analysis
     """The result of the whole stack it was followed from."""
 
+    @cached_property
     def whole(self) -> Analysis | None:
         """The result of the whole stack, where every pixel has been followed; None otherwise."""
         a, near = self.analysis, self.near
@@ -149,7 +151,8 @@ def is_behind(state: ViewState, near: Analysis) -> bool:
 def choose_part(shape: tuple[int, int, int], window: Window | None) -> Part:
     """The part of a stack (K,H,W) worth linearizing: all of a small one, else what is seen."""
     K, H, W = shape
-    most = min(MOST_PIXELS, max(MOST_OBSERVATIONS // K - ANYWAY, ANYWAY))
+    share = max(1, MOST_OBSERVATIONS // K)
+    most = min(MOST_PIXELS, share, max(share - ANYWAY, ANYWAY))
     if window is None or most >= H * W:
         window = Window(0, H, 0, W, 1.0)
     row0, row1, column0, column1, scale = window

@@ -142,7 +142,7 @@ class SamplesView(Watched):
         sample = None if found is None else replace(found, image=frame.number)
         if sample is None:
             self._note = OUTSIDE
-        elif len(self._samples) >= MOST_SAMPLES:
+        elif len(self._samples_left(frame)) >= MOST_SAMPLES:
             self._note = FULL
         else:
             self._note = ""
@@ -200,8 +200,7 @@ class SamplesView(Watched):
     def _show(self, frame: Frame) -> None:
         """Draw both histograms and say what they stand for."""
         now = frame.state.thresholds
-        gone = frame.excluded  # what lies in images that are left out has no say
-        samples = tuple(s for s in self._samples if s.image not in gone)
+        samples = self._samples_left(frame)
         shadows, lit = (pool_samples(samples, kind) for kind in NAMES)
         self._level = level = sample_shadow_level(shadows, lit) if shadows.size else None
         told = [*tell_sampling(self._picking, samples, self._note)]
@@ -213,18 +212,25 @@ class SamplesView(Watched):
         self._stop.disabled = self._picking is None
         self._set_Ts.disabled = level is None
         self._set_Ts.label = "Set Ts" if level is None else f"Set Ts to {tell_threshold(level.Ts)}"
+        self._set_T.disabled = True
         plot = "" if frame.analysis is None else self._plot_residuals(frame, frame.analysis)
         self._plot.content = f'<div id="{self._id}" style="{INDENT}">{plot}</div>'
+
+    def _samples_left(self, frame: Frame) -> tuple[Sample, ...]:
+        """Those of images that are not left out: others have no say."""
+        return tuple(s for s in self._samples if s.image not in frame.excluded)
 
     def _plot_residuals(self, frame: Frame, analysis: Analysis) -> str:
         """Measured once for each result and Ts; while sliders move, the last ones are shown."""
         T, Ts = frame.state.thresholds.T, frame.state.thresholds.Ts
         moving = frame.preview is not None
-        if self._residuals is None or (not moving and self._residuals[:2] != (analysis, Ts)):
+        if not moving and (self._residuals is None or self._residuals[:2] != (analysis, Ts)):
             found = measure_residuals(frame.stack, analysis, Ts)
             self._residuals = (analysis, Ts, found)
+        if self._residuals is None:
+            return ""
         residuals = self._residuals[2]
         passed = f" ({residuals.passed(residuals.T):.1%} passed)" if residuals.values.size else ""
         self._set_T.label = f"Set T to {residuals.T:.4f}{passed}"
-        self._set_T.disabled = False
+        self._set_T.disabled = moving  # it is of thresholds that the sliders have left
         return plot_residuals(residuals.values, residuals.T, T)

@@ -193,7 +193,7 @@ class ThresholdView:
         """Say what the labels and what the bases were computed with."""
         shown, preview, result = frame.state.thresholds, frame.preview, frame.analysis
         if preview is not None:
-            whole, took = preview.whole() is not None, preview.analysis.seconds["total"]
+            whole, took = preview.whole is not None, preview.analysis.seconds["total"]
             text, stale = preview_status(shown, preview.part.step, whole, took), ""
         elif result is None:
             text, stale = threshold_status(shown, None), ""
