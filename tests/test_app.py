@@ -293,7 +293,7 @@ def test_a_preview_is_shown_and_called_one_until_the_run_is_there(
 ) -> None:
     session = enter(page, open_app(result=RESULT), live=True)
     press(page, *"[" * 9)
-    wait_for_text(page, "final to come")
+    wait_for_text(page, "preview")
     wait_until(lambda: len(gate.began) > 0)
     frame = session._frame
     assert frame is not None and frame.preview is not None and frame.labels is not None
@@ -311,7 +311,7 @@ def test_files_are_of_a_run_even_while_a_preview_is_shown(
 ) -> None:
     session = enter(page, open_app(result=RESULT), live=True)
     press(page, *"[" * 9)
-    wait_for_text(page, "final to come")
+    wait_for_text(page, "preview")
     page.get_by_role("tab", name="Export").click()
     gate.release.set()
     _, data = save(page, session, "label maps (indexed PNG, zip)", "all images")

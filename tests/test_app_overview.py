@@ -120,7 +120,7 @@ def test_a_copy_and_a_saturated_image_are_flagged_and_left_out(page: Any, app: A
     page.get_by_role("tab", name="Tune").click()
     shown = session._read().image
     session._panels.picture.go(6)
-    page.get_by_text("number 8 of all").wait_for()
+    page.get_by_text("(8 in the whole stack)").wait_for()
     session._panels.picture.go(shown)
     page.get_by_role("tab", name="Overview").click()
     press(page, "Shift+K")
@@ -173,14 +173,18 @@ def test_how_often_is_chosen_here_shown_on_the_picture_and_kept(page: Any, app: 
     choose(page, session._panels.overview._often, "any shadow")
     wait_until(lambda: session._read().layer == "how often")
     counts = count_classes(RESULT.labels, Factor.ATTACHED, Factor.CAST)
-    wait_for_colours(page, render_often(counts, STACK.mask).astype(int), tolerance=1)
-    caption = f"any shadow in 0 ... {counts.max()} of 12 images"
+    wait_for_colours(
+        page, render_often(counts, len(STACK.images), STACK.mask).astype(int), tolerance=1
+    )
+    caption = f"12 images (yellow), at most {counts.max()} here"
     wait_until(lambda: caption in session._painter._first.legend)
     toggle(page, 5)
     found = result_without(session, 5)
     counts = count_classes(found.labels, *CLASSES["any shadow"])
-    wait_until(lambda: "of 11 images" in session._painter._first.legend)
-    wait_for_colours(page, render_often(counts, STACK.mask).astype(int), tolerance=1)
+    wait_until(lambda: "11 images (yellow)" in session._painter._first.legend)
+    wait_for_colours(
+        page, render_often(counts, len(STACK.images), STACK.mask).astype(int), tolerance=1
+    )
     page.get_by_text("back to input", exact=True).click()
     wait_until(lambda: session._read().layer == "input")
     page.get_by_text("show on picture", exact=True).click()

@@ -46,24 +46,33 @@ def test_choices_and_classes_are_the_same_ones() -> None:
 
 def test_more_often_is_lighter_and_outside_the_mask_is_black() -> None:
     counts = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    count = 11
     mask = np.ones((3, 4), bool)
     mask[0, 1] = False
-    picture = render_often(counts, mask)
+    picture = render_often(counts, count, mask)
     assert picture.shape == (3, 4, 3)
     assert picture[0, 1].tolist() == [0, 0, 0]
     assert picture[0, 0].tolist() == [0x44, 0x01, 0x54]
     assert picture[2, 3].tolist() == [0xFD, 0xE7, 0x25]
     light = (picture @ [0.2126, 0.7152, 0.0722])[mask]
     assert (np.diff(light) > 0).all()
-    none = render_often(np.zeros((3, 4), np.uint16), np.ones((3, 4), bool))
+    none = render_often(np.zeros((3, 4), np.uint16), count, np.ones((3, 4), bool))
     assert (none == [0x44, 0x01, 0x54]).all()
+
+
+def test_a_count_has_one_colour_whatever_other_pixels_count() -> None:
+    counts, mask = np.array([[0, 3, 6]], np.uint16), np.ones((1, 3), bool)
+    picture = render_often(counts, 24, mask)
+    assert picture[0, 2].tolist() == [0x22, 0x90, 0x8C]  # a quarter: the middle of the colours
+    assert np.array_equal(render_often(counts[:, :2], 24, mask[:, :2]), picture[:, :2])
 
 
 def test_the_caption_says_the_range_of_the_colours() -> None:
     counts = np.array([[0, 7], [3, 0]], np.uint16)
-    words = "specular in 0 ... 7 of 24 images, dark purple to yellow"
+    words = "specular in none (dark purple), 6 (teal) ... 24 images (yellow), at most 7 here"
     assert caption_often(counts, 24, "specular") == words
-    assert caption_often(0 * counts, 24, "cast shadow") == "cast shadow in none of 24 images"
+    words = "cast shadow in none (dark purple), 2 (teal) ... 8 images (yellow), at most 0 here"
+    assert caption_often(0 * counts, 8, "cast shadow") == words
 
 
 def test_outside_the_mask_nothing_is_counted() -> None:

@@ -458,9 +458,13 @@ def test_how_often_is_of_all_images_and_drawn_once_whichever_is_shown(
     shown = frame(layer="how often", often="any shadow")
     counts = count_classes(RESULT.labels, Factor.ATTACHED, Factor.CAST)
     painter.paint(shown, None, rested=True)
-    assert np.array_equal(canvas.take()["base png"], render_often(counts, STACK.mask))
+    assert np.array_equal(
+        canvas.take()["base png"], render_often(counts, len(STACK.images), STACK.mask)
+    )
     most = counts.max()
-    assert canvas.readout == f"any shadow in 0 ... {most} of 8 images, dark purple to yellow"
+    assert canvas.readout == (
+        f"any shadow in none (dark purple), 2 (teal) ... 8 images (yellow), at most {most} here"
+    )
     row, column = np.argwhere(counts == most)[0].tolist()
     painter.paint(frame(layer="how often", often="any shadow", image=3), (row, column), rested=True)
     assert set(canvas.take()) <= {"overlay"}
@@ -490,7 +494,9 @@ def test_how_often_is_compared_by_both_methods(painter: Painter, canvas: FakeCan
     )
     results = {"robust": RESULT, "statistical": other}
     painter.paint(compose(Runs(STACK, Options()), results, state), None, rested=True)  # pyright: ignore
-    expected = render_often(count_classes(other.labels, Factor.SPECULAR), STACK.mask)
+    expected = render_often(
+        count_classes(other.labels, Factor.SPECULAR), len(STACK.images), STACK.mask
+    )
     assert np.array_equal(canvas.take()["other png"], expected)
 
 
@@ -510,5 +516,7 @@ def test_how_often_is_drawn_anew_where_the_preview_looks_at_another_part(
         painter.paint(composed, None, rested=True)
         assert composed.often is not None
         shown.append(canvas.take()["base png"])
-        assert np.array_equal(shown[-1], render_often(composed.often, STACK.mask))
+        assert np.array_equal(
+            shown[-1], render_often(composed.often, len(STACK.images), STACK.mask)
+        )
     assert not np.array_equal(*shown)

@@ -1,6 +1,7 @@
 """The i-l plot of one pixel."""
 
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -134,6 +135,24 @@ def test_the_lines_of_the_thresholds_move_with_them():
         xs.append(float(vertical.get("x1", "")))
     unit = (dots(svg)["image 0"][0] - xs[1]) / (0.8 - 0.2)
     assert xs[1] - xs[0] == pytest.approx(0.15 * unit, abs=0.05)
+
+
+@pytest.mark.parametrize("scale", [1, 0.13, 0.031, 0.0042])
+@pytest.mark.parametrize("panels", [1, 2])
+def test_numbers_of_the_axes_lie_neither_over_each_other_nor_over_the_names(scale, panels):
+    drawing = plot_pixel([panel(scale * I, scale * L)] * panels, THRESHOLDS, 0, NAMES)
+    svg = next(iter(parse(drawing)))
+    digit = 6.0
+    numbers = {anchor: [] for anchor in ("middle", "end")}
+    for text in svg.iterfind(f"{SVG}text"):
+        if text.get("x") and (text.text or "").lstrip("-").replace(".", "").isdigit():
+            numbers[text.get("text-anchor")].append((float(text.get("x", "")), text.text))
+    below = sorted(numbers["middle"])
+    assert len(below) >= 2
+    for (x, one), (further, other) in pairwise(below):
+        assert x + digit * len(one) / 2 < further - digit * len(other) / 2
+    name = 10 + 4  # where the upright name ends
+    assert min(x - digit * len(text) for x, text in numbers["end"]) > name
 
 
 def test_methods_share_their_axes_and_keep_their_titles():

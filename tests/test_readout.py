@@ -210,12 +210,12 @@ def test_a_file_name_that_is_not_unicode_can_be_sent():
 @pytest.mark.parametrize(
     ("step", "whole", "said"),
     [
-        (1, True, "preview in 41 ms, final to come."),
-        (1, False, "preview of the part on screen in 41 ms, final to come."),
-        (2, False, "preview of every 2nd pixel in 41 ms, final to come."),
-        (3, False, "preview of every 3rd pixel in 41 ms, final to come."),
-        (4, False, "preview of every 4th pixel in 41 ms, final to come."),
-        (12, False, "preview of every 12th pixel in 41 ms, final to come."),
+        (1, True, "preview, 41 ms."),
+        (1, False, "preview (the part on screen), 41 ms."),
+        (2, False, "preview (every 2nd pixel), 41 ms."),
+        (3, False, "preview (every 3rd pixel), 41 ms."),
+        (4, False, "preview (every 4th pixel), 41 ms."),
+        (12, False, "preview (every 12th pixel), 41 ms."),
     ],
 )
 def test_a_preview_says_of_how_much_it_is_and_how_long_it_took(step, whole, said):
@@ -224,7 +224,7 @@ def test_a_preview_says_of_how_much_it_is_and_how_long_it_took(step, whole, said
 
 def test_a_preview_tells_thresholds_and_time_as_they_are():
     text = preview_status(Thresholds(0.1234, 1e-6), 1, True, 1.25)
-    assert text == "T 0.1234, Ts 1.0e-06: preview in 1250 ms, final to come."
+    assert text == "T 0.1234, Ts 1.0e-06: preview, 1250 ms."
 
 
 def test_the_time_of_a_final_result_is_told_with_its_own_thresholds_only():

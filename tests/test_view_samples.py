@@ -14,6 +14,7 @@ from photolin.stack import ImageStack
 from photolin.synthetic import render_scene
 from webapp.box import Box
 from webapp.frame import Frame
+from webapp.sampling import ONE_IMAGE
 from webapp.state import ViewState
 from webapp.views import samples as module
 from webapp.views.samples import CLEAR, START, UNDO, SamplesView
@@ -179,6 +180,60 @@ def test_a_box_without_the_object_and_one_too_many_are_told(
     tab.view._do("shadow", UNDO)
     tab.view.redraw()
     assert "are the most" not in tab.told
+
+
+def test_samples_of_images_that_are_left_out_leave_room_for_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "MOST_SAMPLES", 1)
+    tab = Tab()
+    tab.view._do("shadow", START)
+    assert tab.view.take_box(BOX)
+    tab.view.redraw()
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    assert module.FULL in tab.told
+    tab.show(0, excluded=(0,))  # another image is the first of those left
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    assert module.FULL not in tab.told
+    assert len(tab.view._samples) == 2
+
+
+def test_shadows_of_one_image_alone_are_told() -> None:
+    tab = Tab()
+    tab.view._do("shadow", START)
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    assert ONE_IMAGE in tab.told
+    tab.show(1)
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    assert ONE_IMAGE not in tab.told
+
+
+def test_T_is_proposed_only_by_what_the_sliders_stand_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While they move nothing is measured, and what was measured before is not offered."""
+    measured, measure = [], module.measure_residuals
+
+    def counted(*of: Any) -> Any:
+        measured.append(of)
+        return measure(*of)
+
+    monkeypatch.setattr(module, "measure_residuals", counted)
+    tab = Tab()
+    assert not tab.view._set_T.disabled
+    assert len(measured) == 1
+    preview: Any = SimpleNamespace(near=RESULT)
+    state = ViewState(T=0.06, Ts=0.05)
+    tab.view.draw(Frame(STACK, state, RESULT, None, None, None, preview))
+    assert tab.view._set_T.disabled
+    assert len(measured) == 1
+    tab.view.draw(Frame(STACK, state, RESULT, None, None, None))
+    assert not tab.view._set_T.disabled
+    assert len(measured) == 2
+    tab.view.draw(Frame(STACK, state, None, None, None, None))
+    assert tab.view._set_T.disabled
 
 
 def test_samples_stay_with_their_image_when_others_are_left_out() -> None:

@@ -10,7 +10,7 @@ from math import ceil, cos, hypot, radians, sin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photolin.export.html_plots import ticks
+from photolin.export.html_plots import thin_ticks, ticks
 
 from .readout import escape
 
@@ -159,10 +159,7 @@ def _spaced(numbers: list[float], unit: NDArray[np.float64]) -> list[float]:
     """
     step = numbers[1] - numbers[0]
     need = [room / max(abs(step * along), 1e-9) for room, along in zip(ROOM, unit, strict=True)]
-    every = max(1, ceil(min(need)))
-    if every >= len(numbers):
-        return []
-    return [value for value in numbers if round(value / step) % every == 0]
+    return thin_ticks(numbers, min(need)) if ceil(min(need)) < len(numbers) else []
 
 
 def _outwards(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

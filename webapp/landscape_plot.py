@@ -116,8 +116,10 @@ def describe_cell(
     }.get(quantity, f"{quantity} of all observations")
     beyond = "" if _inside(landscape, present) else " (the border of the map; T or Ts lie beyond)"
     if here == there:
-        return f"At {tell(here)}{beyond}; it is the middle of the widest stable area."
-    return f"At {tell(here)}{beyond}. In the middle of the widest stable area, {tell(there)}."
+        return f"At {tell(here)}{beyond}; labels are steadiest there."
+    return (
+        f"At {tell(here)}{beyond}. Where labels are steadiest, which is no advice: {tell(there)}."
+    )
 
 
 def colour(scaled: NDArray[np.floating]) -> NDArray[np.uint8]:

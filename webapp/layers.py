@@ -35,7 +35,7 @@ def render_layer(frame: Frame) -> tuple[NDArray[np.uint8], str]:
         return render_surface(frame.shape, state.layer, state.light, stack.mask)
     if counts(frame) and frame.often is not None:
         caption = caption_often(frame.often, len(stack.images), state.often)
-        return render_often(frame.often, stack.mask), caption
+        return render_often(frame.often, len(stack.images), stack.mask), caption
     if frame.analysis is None or state.layer not in SIGNED:
         gain = state.gain or 1.0
         plain = gain == 1 or state.layer == "labels"  # which hide the picture

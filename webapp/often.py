@@ -69,21 +69,24 @@ def share_classes(
     }
 
 
-def render_often(counts: NDArray[np.uint16], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Colours (H,W,3) of counts (H,W): dark purple is none, yellow the most; black outside."""
-    table = colour(np.arange(_most(counts) + 1) / _most(counts))
-    picture = table[counts]
+def render_often(
+    counts: NDArray[np.uint16], count: int, mask: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    """Colours (H,W,3) of counts (H,W): dark purple is none, yellow all `count` images; black
+    outside.
+
+    By the square root, so that what is rare shows; the same for all counts, so that pictures can be
+    compared, and colours tell the same while T and Ts move.
+    """
+    picture = colour(np.sqrt(np.arange(count + 1) / count))[counts]
     picture[~mask] = 0
     return picture
 
 
 def caption_often(counts: NDArray[np.uint16], count: int, often: Often) -> str:
-    """What the colours span, for a stack of `count` images."""
-    if not counts.any():
-        return f"{often} in none of {count} images"
-    return f"{often} in 0 ... {_most(counts)} of {count} images, dark purple to yellow"
-
-
-def _most(counts: NDArray[np.uint16]) -> int:
-    """The greatest count, at least 1."""
-    return max(int(counts.max(initial=0)), 1)
+    """What the colours span, and what is reached, for a stack of `count` images."""
+    most = int(counts.max(initial=0))
+    return (
+        f"{often} in none (dark purple), {round(count / 4)} (teal) ... {count} images (yellow), "
+        f"at most {most} here"
+    )

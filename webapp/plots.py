@@ -10,15 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from photolin.export.html_plots import ticks
+from photolin.export.html_plots import thin_ticks, ticks
 from photolin.factors import LETTERS, TITLES, Factor, Thresholds, css_colour
 
 from .readout import escape
 
 Point = tuple[float, float]
 
-LEFT, TOP, RIGHT, BOTTOM = 40, 22, 16, 36
+LEFT, TOP, RIGHT, BOTTOM = 54, 22, 16, 36
 """Margins around the plot, in the units of the drawing (pixels at its natural size)."""
+DIGIT = 6.2
+"""Width of a digit of the axes, drawing units."""
 BELOW = 0.1
 """How far the axes go below zero at least, of how far they go above it."""
 
@@ -191,7 +193,9 @@ def _frame(axes: _Axes) -> str:
         f'<text x="{LEFT + wide + 4:g}" y="{TOP + 9}" font-weight="600" '
         f'fill="{css_colour(Factor.DIFFUSE)}">{LETTERS[Factor.DIFFUSE]}</text>'
     ]
-    for value in ticks(axes.left, axes.high):
+    numbers = ticks(axes.left, axes.high)
+    room = DIGIT * (1 + max(len(f"{value:g}") for value in numbers))
+    for value in thin_ticks(numbers, room / (axes.unit * (numbers[1] - numbers[0]))):
         x, _ = axes.at(value, 0)
         parts.append(
             f'<text x="{LEFT + x:g}" y="{TOP + high + 14:g}" text-anchor="middle">{value:g}</text>'

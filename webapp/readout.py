@@ -143,8 +143,8 @@ def preview_status(thresholds: Thresholds, step: int, whole: bool, seconds: floa
     T, Ts = tell_threshold(thresholds.T), tell_threshold(thresholds.Ts)
     nth = {1: "st", 2: "nd", 3: "rd"}.get(step % 10 if step % 100 not in (11, 12, 13) else 0, "th")
     each = "the part on screen" if step == 1 else f"every {step}{nth} pixel"
-    part = "" if whole else f" of {each}"
-    return f"T {T}, Ts {Ts}: preview{part} in {1000 * seconds:.0f} ms, final to come."
+    part = "" if whole else f" ({each})"
+    return f"T {T}, Ts {Ts}: preview{part}, {1000 * seconds:.0f} ms."
 
 
 def threshold_status(

@@ -23,6 +23,9 @@ MOST = 20_000
 """Intensities kept of one sample, and four times as many of a kind: an even choice of more."""
 
 
+ONE_IMAGE = "Shadows of one image alone: others may be brighter, sample some of them too."
+
+
 @dataclass(frozen=True, eq=False)
 class Sample:
     """The mask pixels of a box in one image."""
@@ -79,6 +82,9 @@ def tell_sampling(picking: Kind | None, samples: tuple[Sample, ...], note: str) 
             f'background:{COLOURS[kind]}"></span>'
         )
         parts.append(f"<div>{swatch}{escape(f'{name}: {count}' if own else f'{name}: none')}</div>")
+    shadows = {sample.image for sample in samples if sample.kind == "shadow"}
+    if len(shadows) == 1:
+        parts.append(f"<div>{escape(ONE_IMAGE)}</div>")
     if note:
         parts.append(f"<div><b>{escape(note)}.</b></div>")
     return parts

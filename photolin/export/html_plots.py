@@ -4,7 +4,7 @@ All text in them is the program's own; nothing of the user's gets here.
 """
 
 from collections.abc import Mapping, Sequence
-from math import floor, log10
+from math import ceil, floor, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,16 @@ def ticks(low: float, high: float) -> list[float]:
     step = max(s * power for s in (1, 2, 5) if s * power <= third)
     numbers = range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)
     return [float(f"{n * step:.6g}") for n in numbers]
+
+
+def thin_ticks(numbers: list[float], gaps: float) -> list[float]:
+    """Every so many of evenly spaced numbers, 0 among them, that they do not lie over each other.
+
+    Args:
+        gaps: how much room one takes, in gaps between two neighbours.
+    """
+    step, every = numbers[1] - numbers[0], max(1, ceil(gaps))
+    return [value for value in numbers if round(value / step) % every == 0]
 
 
 def _svg(width: float, height: float, words: str, inner: str) -> str:

@@ -34,7 +34,8 @@ PATIENCE = 0.3
 HELP = (
     "Click to set T and Ts. The map labels the linearized bases of the result shown anew for each "
     "T and Ts, it does not linearize again. Cross: T and Ts as the sliders stand. Ring: the middle "
-    "of the widest area where labels hardly change, which in noise is at a greater T than the best."
+    "of the widest area where labels hardly change; in noise its T is greater than the best, and a "
+    "new result has another."
 )
 
 

@@ -37,7 +37,8 @@ class PictureView:
             1,
             0,
             marks=(),  # their numbers would lie under the handle
-            hint="Image number, from 0 (keys: left and right arrow)",
+            hint="Number among the images that are not left out, from 0 (keys: left and right "
+            "arrow)",
         )
         self._buttons = gui.add_button_group(
             " ",
@@ -124,7 +125,7 @@ class PictureView:
         file = frame.stack.names[frame.state.image]
         out = len(frame.excluded)
         left = f" ({out} left out)" if out else ""
-        number = f", number {frame.number} of all" if out else ""
+        number = f" ({frame.number} in the whole stack)" if out else ""
         self._name.content = (
             f'<div style="{INDENT};font-size:0.8em"><b>{escape(frame.stack.title)}</b> '
             f"&nbsp;{K} images{left}, {H} rows × {W} columns "

@@ -70,13 +70,14 @@ def _doubt(labels: NDArray[np.uint8] | None) -> str:
 
 def _strip(labels: NDArray[np.uint8], method: str, patterns: bool) -> str:
     cells = [
-        f'<span style="white-space:nowrap" title="{row.title}: {row.count} pixels">'
+        f'<span style="white-space:nowrap" title="{row.title}: {row.count} of the pixels inside '
+        f'the mask, in the image shown">'
         f"{swatch(row.factor, patterns)} {row.letter} {row.percent:.1f} %</span>"
         for row in legend(labels)
     ]
     name = f'<span style="width:100%">{escape(method)}</span>' if method else ""
     return (
-        f'<div style="{INDENT};font-size:0.85em;display:flex;'
-        'flex-wrap:wrap;gap:0 0.8em;font-variant-numeric:tabular-nums">'
+        f'<div style="{INDENT};font-size:0.8em;display:flex;'
+        'flex-wrap:wrap;gap:0 0.55em;font-variant-numeric:tabular-nums">'
         f"{name}{''.join(cells)}</div>"
     )

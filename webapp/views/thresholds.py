@@ -69,9 +69,10 @@ class ThresholdView:
         self._buttons = gui.add_button_group(
             " ",
             (SUGGEST, LINEARIZE),
-            hint="suggest: T from the noise below the fit, Ts from the dark end of the histogram "
-            "(key: S). linearize again: T and Ts enter the linearization itself; until then only "
-            "the labels follow the sliders (key: R)",
+            hint="suggest: T from the noise below the fit, but 0.016 at least, Ts from the dark "
+            "end of the histogram and from attached shadows (key: S). linearize again: T and Ts "
+            "enter the linearization itself; until then only the labels follow the sliders (key: "
+            "R)",
         )
         self.begin(initial)
         for handle, most in self.typed:
@@ -101,7 +102,7 @@ class ThresholdView:
             "T and Ts",
             (UNDO, REDO, RESET),
             hint="undo, redo: changes of T and Ts, a step for each rest of the sliders (keys: Z, "
-            "Shift-Z). reset: T and Ts of the first result",
+            "Shift-Z), as long as this page is open. reset: T and Ts of the first result",
         )
 
         actions = {UNDO: self.undo, REDO: self.redo, RESET: self.reset}
