@@ -1,5 +1,7 @@
 """How often: counts of the labels on screen, their colours and words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,15 @@ from photolin.factors import OUTSIDE, Factor, Thresholds
 from photolin.label import label_images
 from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
-from webapp.often import CLASSES, caption_often, count_often, label_all, render_often, share_classes
+from webapp.often import (
+    CLASSES,
+    FEW,
+    caption_often,
+    count_often,
+    label_all,
+    render_often,
+    share_classes,
+)
 from webapp.state import OFTEN
 
 STACK = render_scene("sphere_cone", size=(24, 32), images=8).stack
@@ -37,6 +47,25 @@ def test_every_image_is_lit_or_in_shadow_or_undefined(thresholds: Thresholds) ->
     for often, count in counts.items():
         assert np.array_equal(count, np.isin(labels, CLASSES[often]).sum(axis=0))
         assert count.any() or thresholds == HERE, often
+
+
+@pytest.mark.parametrize("thresholds", [HERE, THERE])
+@pytest.mark.parametrize("share", [0, 0.05, 0.6])
+def test_counts_of_some_pixels_alone_are_those_of_all(share: float, thresholds: Thresholds) -> None:
+    where = np.random.default_rng(0).random(STACK.mask.shape) < share
+    for often in OFTEN:
+        some = count_often(STACK, RESULT, thresholds, often, where)
+        whole = count_often(STACK, RESULT, thresholds, often)
+        assert np.array_equal(some[where], whole[where])
+        assert share > FEW or not some[~where].any()
+
+
+def test_outside_the_mask_nothing_is_counted_of_some_pixels_either() -> None:
+    mask, where = STACK.mask.copy(), np.zeros(STACK.mask.shape, bool)
+    mask[:, :2], where[:, :3] = False, True
+    counts = count_often(replace(STACK, mask=mask), RESULT, THERE, "any shadow", where)
+    assert not counts[:, :2].any()
+    assert np.array_equal(counts[:, 2], count_often(STACK, RESULT, THERE, "any shadow")[:, 2])
 
 
 def test_choices_and_classes_are_the_same_ones() -> None:

@@ -141,7 +141,7 @@ def _count(
             if result is analysis and followed is preview and counts is not None:
                 return counts
     if preview is not None and analysis is preview.near:
-        whole = count_often(stack, analysis, *wanted)
+        whole = count_often(stack, analysis, *wanted, where=~preview.covered)
         return preview.lay(whole, count_classes(preview.analysis.labels, *CLASSES[state.often]))
     return count_often(stack, analysis, *wanted)
 

@@ -77,19 +77,29 @@ class Preview:
 
     def lay(self, whole: NDArray[Value], own: NDArray[Value]) -> NDArray[Value]:
         """Values (H,W) with those (h,w) of the part laid over them, inside the mask of both."""
-        part = self.part
-        rows, columns = part.row1 - part.row0, part.column1 - part.column0
-        place = slice(part.row0, part.row1), slice(part.column0, part.column1)
-
-        def widen(values: NDArray[Any]) -> NDArray[Any]:
-            wide = values.repeat(part.step, axis=0)[:rows]
-            return wide.repeat(part.step, axis=1)[:, :columns]
-
-        # a pixel that stands for its neighbours may lie outside the mask, or they
-        inside = widen(self.analysis.mask) & self.near.mask[place]
+        place = self._place
         laid = whole.copy()
-        laid[place] = np.where(inside, widen(own), whole[place])
+        laid[place] = np.where(self.covered[place], self._widen(own), whole[place])
         return laid
+
+    @cached_property
+    def covered(self) -> NDArray[np.bool_]:
+        """(H,W) where the values of the part are shown."""
+        covered = np.zeros(self.near.mask.shape, np.bool_)
+        # a pixel that stands for its neighbours may lie outside the mask, or they
+        covered[self._place] = self._widen(self.analysis.mask) & self.near.mask[self._place]
+        return covered
+
+    @property
+    def _place(self) -> tuple[slice, slice]:
+        part = self.part
+        return slice(part.row0, part.row1), slice(part.column0, part.column1)
+
+    def _widen(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (h,w) of the part for all its rows and columns."""
+        part = self.part
+        wide = values.repeat(part.step, axis=0)[: part.row1 - part.row0]
+        return wide.repeat(part.step, axis=1)[:, : part.column1 - part.column0]
 
 
 class Live:

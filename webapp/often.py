@@ -25,11 +25,36 @@ CLASSES: dict[Often, tuple[Factor, ...]] = {
 """What each choice counts."""
 
 
+FEW = 0.1
+"""Share of the pixels up to which it is quicker to gather those that are wanted."""
+
+
 def count_often(
-    stack: ImageStack, analysis: Analysis, thresholds: Thresholds, often: Often
+    stack: ImageStack,
+    analysis: Analysis,
+    thresholds: Thresholds,
+    often: Often,
+    where: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.uint16]:
-    """(H,W) in how many of the K images each pixel is so, by `thresholds`; 0 outside the mask."""
-    return count_classes(label_all(stack, analysis, thresholds), *CLASSES[often])
+    """(H,W) in how many of the K images each pixel is so, by `thresholds`; 0 outside the mask.
+
+    Args:
+        where: (H,W) the pixels that are wanted; others may be 0.
+    """
+    wanted = stack.mask if where is None else stack.mask & where
+    places = np.flatnonzero(wanted)
+    if places.size > FEW * wanted.size:
+        return count_classes(label_all(stack, analysis, thresholds), *CLASSES[often])
+    counts = np.zeros(wanted.shape, np.uint16)
+    labels = label_images(
+        stack.images.reshape(len(stack.images), 1, -1)[..., places],
+        analysis.linearized_bases.reshape(3, 1, -1)[..., places],
+        analysis.coefficients,
+        np.ones((1, places.size), np.bool_),
+        thresholds,
+    )
+    counts.reshape(-1)[places] = count_classes(labels, *CLASSES[often])[0]
+    return counts
 
 
 def label_all(
