@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from .analysis import Cancel, Progress
 from .errors import Cancelled
+from .priority import lower_priority
 
 _background: ContextVar[bool] = ContextVar("background", default=False)
 
@@ -18,7 +19,8 @@ _background: ContextVar[bool] = ContextVar("background", default=False)
 def in_background() -> Iterator[None]:
     """Work begun in this thread meanwhile does not stand in the way of that of other threads.
 
-    Its blocks are done by threads of their own, so that they may also wait in `cancel`.
+    Its blocks are done by threads of their own, which let others go first, and may also wait in
+    `cancel`.
     """
     token = _background.set(True)
     try:
@@ -95,4 +97,4 @@ def run_blocks(
 @functools.cache
 def _pool(threads: int, background: bool) -> ThreadPoolExecutor:
     """Threads shared by callers of a kind: starting them takes longer than a block of work."""
-    return ThreadPoolExecutor(threads, "block")
+    return ThreadPoolExecutor(threads, "block", lower_priority if background else None)

@@ -15,7 +15,8 @@ import photolin
 ROOT = Path(__file__).parent.parent
 
 FLOORS = (
-    ("allocator", "errors", "factors", "stack", "analysis", "observations", "compiling"),
+    ("allocator", "priority", "errors", "factors", "stack", "analysis", "observations"),
+    ("compiling",),
     ("kernels", "blocks", "consensus", "sample"),
     ("load", "synthetic", "command"),
     ("bases", "factorize", "refine", "coefficients", "settle", "refit", "fine", "saturation"),

@@ -7,6 +7,7 @@ from time import monotonic
 
 from photolin.blocks import in_background
 from photolin.errors import Cancelled
+from photolin.priority import lower_priority
 
 from .courtesy import TURN, end_rests, give_way
 
@@ -63,6 +64,7 @@ class Job:
         return self._stop.is_set()
 
     def _run(self, work: Callable[[], None]) -> None:
+        lower_priority()
         try:
             with in_background():
                 self._around(work)

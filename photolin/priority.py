@@ -1,0 +1,15 @@
+"""Threads that let others go first, where the system has priorities of threads; else nothing."""
+
+import os
+import sys
+from threading import get_native_id
+
+LOWER = 10
+"""Steps of niceness: a tenth of the processor where both it and a usual thread could use it."""
+
+
+def lower_priority() -> None:
+    """Let other threads go first from now on; the thread that calls it cannot take this back."""
+    if sys.platform == "linux":  # elsewhere it would be all threads of the program
+        thread = get_native_id()
+        os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + LOWER)
