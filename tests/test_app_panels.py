@@ -20,7 +20,8 @@ from photolin.pipeline import analyze
 from photolin.synthetic import render_scene
 from webapp.app import App
 from webapp.frame import pixel_values
-from webapp.session import STEP, Session
+from webapp.pace import STEP
+from webapp.session import Session
 from webapp.source import Source
 from webapp.viser_internals import widget_id
 
@@ -92,7 +93,7 @@ def test_a_slider_that_rests_while_it_is_dragged_makes_one_step(page: Any, app: 
     rests = []
     for x_now in (x + 15, x + 30):
         page.mouse.move(x_now, y, steps=3)
-        wait_until(lambda: session._rested(STEP) and session._read().thresholds not in rests)
+        wait_until(lambda: session._pace.rested(STEP) and session._read().thresholds not in rests)
         rests.append(session._read().thresholds)
     page.mouse.up()
     wait_until(lambda: view._history.now == rests[-1])

@@ -70,12 +70,12 @@ def enter(page: Any, app: App) -> Session:
     wait_until(lambda: len(app._sessions) == 1 and not before & set(app._sessions.values()))
     (session,) = app._sessions.values()
     wait_until(lambda: session._frame is not None and session._frame.analysis is not None, 30)
-    wait_until(lambda: session._saved is not None)
+    wait_until(lambda: session._record.latest is not None)
     return session
 
 
 def kept(session: Session) -> bool:
-    return session._saved is not None and session._saved.state == session._read()
+    return session._record.latest is not None and session._record.latest.state == session._read()
 
 
 def test_what_was_set_survives_a_reload_and_a_restart(
@@ -179,11 +179,11 @@ def test_memory_is_given_back_when_a_tab_rests_and_after_it_is_closed(
     page: Any, open_app: OpenApp, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[str] = []
-    for module in ("app", "session"):
+    for module in ("app", "pace"):
         monkeypatch.setattr(f"webapp.{module}.LULL", 0.5)
         monkeypatch.setattr(f"webapp.{module}.give_back", lambda by=module: given.append(by))
     session = enter(page, open_app(folder))
-    wait_until(lambda: given[-1:] == ["session"])
+    wait_until(lambda: given[-1:] == ["pace"])
     page.wait_for_timeout(1500)
     rests = len(given)
     page.wait_for_timeout(1500)

@@ -652,7 +652,7 @@ def test_a_shape_of_other_thresholds_says_so_until_it_is_recovered_again(
     session = enter(page, open_app())
     recover(page, session)
     session._panels.thresholds._T.value = 0.08
-    session._wake.set()
+    session._pace.wake()
     wait_for_text(page, "This shape is of T 0.0500, Ts 0.0200; recover again")
     wait_until(lambda: session._bench.work.results["robust"].thresholds.T == 0.08)
     wait_until(lambda: not session._bench.work._job._running)

@@ -87,7 +87,7 @@ def test_a_session_whose_exclusions_cannot_be_any_more_opens_without_them(tmp_pa
 
 def rested(session: Session) -> bool:
     """Whether the tab knows what it shows, and has kept it."""
-    return session._saved is not None and session._saved.state == session._read()
+    return session._record.latest is not None and session._record.latest.state == session._read()
 
 
 def test_what_is_done_just_before_a_tab_is_closed_is_kept() -> None:

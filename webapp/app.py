@@ -11,9 +11,10 @@ from photolin.errors import PhotolinError
 
 from .access import Server, open_server
 from .keeper import Keeper
+from .pace import LULL
 from .saved import Saved
 from .selections import Selections
-from .session import LULL, Session
+from .session import Session
 from .source import Source
 from .start import leave_out, start_from
 

@@ -12,36 +12,30 @@ from time import monotonic
 
 import viser
 
-from photolin.allocator import give_back
 from photolin.analysis import Analysis, Method
 from photolin.errors import Cancelled, OptionError, PhotolinError
 from photolin.factors import Thresholds
 
 from .bench import Bench
 from .canvas import Canvas
-from .courtesy import give_way, urgent
+from .courtesy import urgent
 from .desk import Desk
 from .frame import Frame, compose
 from .keeper import Keeper
 from .live import Preview
 from .notices import Notices
+from .pace import REST, STEP, Pace
 from .painter import Painter
 from .panels import Actions, Panels
 from .pointing import Pointing
+from .record import Record
 from .saved import Saved
 from .selections import Selections, follow_image
 from .state import SURFACE, Pixel, ViewState
 from .theme import set_theme
 
-REST = 0.3
-"""Seconds without a change after which a rough picture is drawn again without loss."""
-STEP = 1.0
-"""Seconds without a change after which what follows is another step to undo. A slider does not rest
-while it is held."""
 PATIENCE = 0.25
 """Seconds after which a preview gives way to newer thresholds before it is done."""
-LULL = 5.0
-"""Seconds without work after which memory that is free is given back."""
 PARTING = 2.0
 """Seconds that are waited, at most, for a tab that was closed to keep what it showed."""
 
@@ -64,18 +58,16 @@ class Session:
             start: what it shows at first.
             again: whether somebody has chosen that, so that no thresholds are suggested.
         """
-        self._client, self._source, self._keeper = client, selections.source, keeper
-        self._wake, self._closed = Event(), Event()
+        self._client, self._source = client, selections.source
+        self._pace, self._closed = Pace(), Event()
         self.notices = Notices(client, self._closed)
         self._frame: Frame | None = None
         self._shown_results: dict[Method, Analysis] | None = None
         self._excluded = start.exclusions
-        self._saved: Saved | None = None
-        self._again = again
+        self._record = Record(keeper, again=again)
         first = None if again else start.state.thresholds
         self._bench = Bench(selections, self._excluded, first, self._desk())
-        self._changed = monotonic()
-        self._pointing = Pointing(self._wake.set)
+        self._pointing = Pointing(self._pace.wake)
         self._build(start.state)
         if (found := self._bench.work.recovered) is not None:  # a result came with it
             self._shaped()
@@ -83,7 +75,7 @@ class Session:
         if again:
             self._pointing.restore(start.state)
             self._panels.restore(start)
-        self._wake.set()
+        self._pace.wake()
         self._worker = Thread(target=self._draw, name="tab", daemon=True)
         self._worker.start()
 
@@ -92,7 +84,7 @@ class Session:
         self._closed.set()
         self._bench.close()
         self._panels.close()
-        self._wake.set()
+        self._pace.wake()
 
     def wait(self) -> None:
         """Wait, once it is closed, until what was done last is kept."""
@@ -129,7 +121,7 @@ class Session:
             shaped=self._shaped,
             tell=self.notices.tell,
             refuse=self.notices.refuse,
-            changed=self._wake.set,
+            changed=self._pace.wake,
         )
 
     # the panels that these move are made later
@@ -155,13 +147,13 @@ class Session:
         self._panels.picture.offer(surface=True)
         if self._read().layer not in SURFACE:
             self._panels.picture.show("relit")
-        self._wake.set()
+        self._pace.wake()
 
     # --- what the user does ---
 
     def _actions(self) -> Actions:
         return Actions(
-            changed=self._wake.set,
+            changed=self._pace.wake,
             suggest=self._bench.suggest,
             linearize=self._bench.linearize,
             stop=self._bench.stop,
@@ -176,7 +168,7 @@ class Session:
         )
 
     def _hold(self, on: bool) -> None:
-        self._changed = monotonic()  # what a slider says last may come after it was let go of
+        self._pace.touch()  # what a slider says last may come after it was let go of
         self._pointing.hold(on)
 
     def _press(self, key: str) -> None:
@@ -204,7 +196,7 @@ class Session:
         """Leave an image of the whole stack out, or take it in again."""
         others = {*self._excluded} - {image}
         self._excluded = tuple(sorted(others | {image} if out else others))
-        self._wake.set()
+        self._pace.wake()
 
     def _copy(self) -> None:
         """Copy the command line that makes what is shown."""
@@ -223,14 +215,7 @@ class Session:
     def _draw(self) -> None:
         rough = False
         while not self._closed.is_set():
-            rest = next((rest for rest in (REST, STEP) if not self._rested(rest)), 0.0)
-            if rough:
-                self._wake.wait(max(self._changed + rest - monotonic(), 0.01))
-            elif not self._wake.wait(LULL):
-                give_way()  # other tabs may be busy
-                give_back()
-                self._wake.wait()
-            self._wake.clear()
+            self._pace.wait(rough=rough)
             try:
                 with urgent():
                     rough = self._round()
@@ -239,7 +224,9 @@ class Session:
             except Exception as error:
                 rough = False
                 self.notices.tell(error)
-        if self._saved is not None:  # what was done just before the tab was closed is kept too
+        if (
+            self._record.latest is not None
+        ):  # what was done just before the tab was closed is kept too
             self._keep(self._read(), rested=True)
 
     def _read(self) -> ViewState:
@@ -253,10 +240,10 @@ class Session:
         bench, pointing = self._bench, self._pointing
         state, results, frame = self._read(), bench.work.results, self._frame
         if frame is None or state != frame.state:
-            self._changed = monotonic()
-        rested = self._rested(REST)
+            self._pace.touch()
+        rested = self._pace.rested(REST)
         holding = pointing.holding  # letting go wakes the worker
-        step = self._rested(STEP) and not holding
+        step = self._pace.rested(STEP) and not holding
         moving = self._panels.thresholds.settle(state.thresholds, step) and not holding
         bench.work.ensure(state)
         preview = self._follow(state, results)
@@ -277,10 +264,6 @@ class Session:
             self._panels.redraw()
         behind = bench.catch_up.pursue(state, results.get(state.method), rested)
         return self._keep(state, rested) or behind or rough or moving
-
-    def _rested(self, seconds: float) -> bool:
-        """Whether nothing has changed for so long."""
-        return monotonic() - self._changed >= seconds
 
     def _follow(self, state: ViewState, results: dict[Method, Analysis]) -> Preview | None:
         """What the thresholds of the view make of what is on screen, where no run is right yet."""
@@ -314,18 +297,6 @@ class Session:
             self.notices.say("Shape", "it was of other images; recover it again (key: N)")
 
     def _keep(self, state: ViewState, rested: bool) -> bool:
-        """Keep the session once it rests; whether that is still to come.
-
-        A tab in which nobody has done anything keeps nothing: what it shows at first is known once
-        the first result has moved the sliders, where it does. Later there may be no result for
-        long, or for good, of the images that are left.
-        """
-        if self._saved is None and not (self._again or self._bench.work.results):
-            return False
-        saved = Saved(state, self._bench.runs.excluded, self._panels.notes.read())
-        if saved == self._saved or not rested:
-            return saved != self._saved
-        if self._saved is not None:
-            self._keeper.keep(saved)
-        self._saved = saved
-        return False
+        """Keep the session once it rests; whether that is still to come."""
+        now = Saved(state, self._bench.runs.excluded, self._panels.notes.read())
+        return self._record.follow(now, rested=rested, begun=bool(self._bench.work.results))

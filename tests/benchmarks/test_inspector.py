@@ -31,7 +31,8 @@ from photolin.analysis import METHODS, Options
 from photolin.factors import Factor
 from webapp.app import App
 from webapp.canvas import Window
-from webapp.session import LULL, Session
+from webapp.pace import LULL
+from webapp.session import Session
 from webapp.source import Source
 from webapp.state import LAYERS, SURFACE
 from webapp.viser_internals import SUBPROTOCOL
@@ -111,7 +112,7 @@ class Watch:
         began = time.perf_counter()
         act()
         call = time.perf_counter() - began
-        self.session._wake.set()
+        self.session._pace.wake()
         wait_until(lambda: bool(self.taken), 60)
         time.sleep(0.5)  # what is drawn again at rest is part of it
         wait_until(lambda: not self.session._bench.work._job._running, 120)
@@ -200,7 +201,7 @@ def use(session: Session, seconds: float, seed: int) -> int:
     end, count = time.monotonic() + seconds, 0
     while time.monotonic() < end:
         acts[rng.integers(len(acts))]()
-        session._wake.set()
+        session._pace.wake()
         time.sleep(0.05 if rng.random() < 0.9 else 0.6)
         count += 1
     wait_until(lambda: not session._bench.work._job._running, 60)
@@ -215,7 +216,7 @@ def test_memory_stays_after_200_tabs_and_ten_minutes_of_use(benchmark: Benchmark
         with open_tab(app) as session:
             for method in METHODS:
                 session._panels.run._method.value = method
-                session._wake.set()
+                session._pace.wake()
                 bench = session._bench
                 wait_until(lambda m=method, b=bench: m in b.work.results, 60)
             use(session, 60 * MINUTES / 5, 1)
