@@ -117,6 +117,10 @@ def test_a_copy_and_a_saturated_image_are_flagged_and_left_out(page: Any, app: A
         assert np.array_equal(found.coefficients, expected.coefficients)
         card(page, gone[-1]).get_by_text("left out").wait_for()
     page.get_by_text("12 images, 2 left out").wait_for()
+    # what is below stays where it is
+    heights = page.eval_on_selector_all(".photolin-card", "all => all.map((c) => c.offsetHeight)")
+    assert len(heights) == 12
+    assert len(set(heights)) == 1
     page.get_by_role("tab", name="Tune").click()
     shown = session._read().image
     session._panels.picture.go(6)

@@ -47,9 +47,9 @@ text-align:center;border-radius:3px;background:rgba(0,0,0,.6);color:#fff;cursor:
 .photolin-line{display:flex;align-items:center;gap:.6rem;height:1.35em}
 .photolin-line .photolin-bar{flex:1}
 .photolin-cancel{cursor:pointer;text-decoration:underline}
-.photolin-badge{display:inline-block;margin:2px 3px 0 0;padding:0 .35em;border-radius:3px;
-background:#F0E442;color:#000}
-.photolin-badge.gone{background:rgba(128,128,128,.4);color:inherit}
+.photolin-badges{position:absolute;top:3px;left:3px;right:1.9em;display:flex;flex-wrap:wrap;gap:2px}
+.photolin-badge{padding:0 .35em;border-radius:3px;background:#F0E442;color:#000}
+.photolin-badge.gone{background:#555;color:#fff}
 """
 """Of the cards; one rule for all keeps each small."""
 
@@ -202,7 +202,8 @@ def _draw(card: Card, now: bool, sheet: Sheet | None) -> str:
         f'<div class="photolin-thumb"{place}></div>'
         f'<div class="photolin-corner" data-part="toggle-{k}" title="{verb}">{sign}</div>'
         f'<div class="photolin-name" title="{escape(f"Image {k}: {card.name}.{facts}")}">'
-        f"<b>{k}</b> {short}</div>{_draw_bar(card.shares)}{''.join(badges)}</div>"
+        f"<b>{k}</b> {short}</div>{_draw_bar(card.shares)}"
+        f'<div class="photolin-badges">{"".join(badges)}</div></div>'
     )
 
 
