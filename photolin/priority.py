@@ -9,7 +9,10 @@ LOWER = 10
 
 
 def lower_priority() -> None:
-    """Let other threads go first from now on; the thread that calls it cannot take this back."""
+    """Let other threads go first from now on; the thread that calls it cannot take this back.
+
+    Nor can those that it starts: they inherit it, and may call this again.
+    """
     if sys.platform == "linux":  # elsewhere it would be all threads of the program
-        thread = get_native_id()
-        os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + LOWER)
+        usual = os.getpriority(os.PRIO_PROCESS, os.getpid())  # that of the first thread
+        os.setpriority(os.PRIO_PROCESS, get_native_id(), usual + LOWER)

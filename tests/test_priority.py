@@ -30,6 +30,15 @@ def test_a_thread_goes_last_and_the_others_do_not() -> None:
         assert pool.submit(niceness).result() == USUAL
 
 
+def test_whoever_is_started_by_a_thread_that_goes_last_goes_no_further_back() -> None:
+    def start_another() -> int:
+        with ThreadPoolExecutor(1, initializer=lower_priority) as pool:
+            return pool.submit(niceness).result()
+
+    with ThreadPoolExecutor(1, initializer=lower_priority) as pool:
+        assert pool.submit(start_another).result() == min(USUAL + LOWER, 19)
+
+
 def test_blocks_in_the_background_go_last() -> None:
     found: list[int] = []
 
