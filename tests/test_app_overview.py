@@ -135,7 +135,7 @@ def test_a_copy_and_a_saturated_image_are_flagged_and_left_out(page: Any, app: A
 
 def test_a_click_goes_to_the_image_whatever_is_left_out(page: Any, app: App) -> None:
     session = enter(page, app)
-    card(page, 7).locator(".photolin-thumb").click()
+    card(page, 7).locator(".photolin-name").click()
     wait_until(lambda: session._read().image == 7)
     page.locator(".photolin-card.now[data-part=image-7]").wait_for()
     press(page, "k")
@@ -145,7 +145,7 @@ def test_a_click_goes_to_the_image_whatever_is_left_out(page: Any, app: App) -> 
     result_without(session, 2, 7)
     wait_until(lambda: settled(session), 60)
     for image, left in [(9, 7), (0, 0), (3, 2)]:
-        card(page, image).locator(".photolin-thumb").click()
+        card(page, image).locator(".photolin-name").click()
         wait_until(lambda left=left: session._read().image == left)
         page.locator(f".photolin-card.now[data-part=image-{image}]").wait_for()
         wait_until(lambda left=left: session._frame.state.image == left)  # pyright: ignore
@@ -154,7 +154,7 @@ def test_a_click_goes_to_the_image_whatever_is_left_out(page: Any, app: App) -> 
         assert np.array_equal(frame.stack.images[left], STACK.images[image])
         assert frame.stack.names[left] == STACK.names[image]
         page.get_by_text(f"{STACK.names[image]}").first.wait_for(state="attached")
-    card(page, 7).locator(".photolin-thumb").click()  # there is nothing to go to
+    card(page, 7).locator(".photolin-name").click()  # there is nothing to go to
     toggle(page, 7)
     result_without(session, 2)
     assert session._read().image == 2

@@ -66,6 +66,7 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     seen = [first]
     for _ in range(2):
         press(page, "]")
+        wait_until(lambda: session._read().thresholds not in seen)
         wait_until(lambda: session._panels.thresholds._history.now == session._read().thresholds)
         seen.append(session._read().thresholds)
     assert len(set(seen)) == 3
