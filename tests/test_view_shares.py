@@ -60,3 +60,14 @@ def test_hardly_any_shadow_beside_much_undefined_makes_Ts_doubtful(
     pixels: dict[str, int], doubted: bool
 ) -> None:
     assert ("Ts may be too low" in shown(**pixels)) is doubted
+
+
+@pytest.mark.parametrize(("whole", "signs"), [(None, 5), (RESULT, 0)])
+def test_shares_of_a_preview_of_a_part_are_told_as_about_right(whole: Any, signs: int) -> None:
+    """Those of the method beside it are right."""
+    gui: Any = Gui()
+    frame = compose(Runs(STACK, Options()), {"robust": RESULT}, ViewState(T=0.05, Ts=0.02))
+    preview: Any = SimpleNamespace(whole=whole)
+    SharesView(gui).draw(replace(frame, preview=preview, beside=RESULT, beside_labels=frame.labels))
+    assert gui.handle.content.count(" %</span>") == 10
+    assert gui.handle.content.count("≈") == signs

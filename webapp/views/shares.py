@@ -38,7 +38,11 @@ class SharesView:
         self._strip = gui.add_html("")
 
     def draw(self, frame: Frame) -> None:
-        """Shares of the image shown, inside the mask; a second line for the method beside it."""
+        """Shares of the image shown, inside the mask; a second line for the method beside it.
+
+        Those of a preview of a part are told as about right.
+        """
+        rough = frame.preview is not None and frame.preview.whole is None
         rows = [
             (analysis.options.method, labels)
             for analysis, labels in (
@@ -48,8 +52,13 @@ class SharesView:
             if analysis is not None and labels is not None
         ]
         self._strip.content = "".join(
-            _strip(labels, method if len(rows) > 1 else "", frame.state.patterns)
-            for method, labels in rows
+            _strip(
+                labels,
+                method if len(rows) > 1 else "",
+                frame.state.patterns,
+                "≈" if rough and n == 0 else "",
+            )
+            for n, (method, labels) in enumerate(rows)
         ) + _doubt(rows[0][1] if rows else None)
 
 
@@ -68,11 +77,11 @@ def _doubt(labels: NDArray[np.uint8] | None) -> str:
     return f'<div style="{INDENT};font-size:0.8em;{ATTENTION}">{escape(text)}</div>'
 
 
-def _strip(labels: NDArray[np.uint8], method: str, patterns: bool) -> str:
+def _strip(labels: NDArray[np.uint8], method: str, patterns: bool, about: str) -> str:
     cells = [
         f'<span style="white-space:nowrap" title="{row.title}: {row.count} of the pixels inside '
         f'the mask, in the image shown">'
-        f"{swatch(row.factor, patterns)} {row.letter} {row.percent:.1f} %</span>"
+        f"{swatch(row.factor, patterns)} {row.letter} {about}{row.percent:.1f} %</span>"
         for row in legend(labels)
     ]
     name = f'<span style="width:100%">{escape(method)}</span>' if method else ""
