@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import suppress
 from threading import get_native_id
 
 LOWER = 10
@@ -15,4 +16,5 @@ def lower_priority() -> None:
     """
     if sys.platform == "linux":  # elsewhere it would be all threads of the program
         usual = os.getpriority(os.PRIO_PROCESS, os.getpid())  # that of the first thread
-        os.setpriority(os.PRIO_PROCESS, get_native_id(), usual + LOWER)
+        with suppress(OSError):  # work goes on as well where a sandbox forbids it
+            os.setpriority(os.PRIO_PROCESS, get_native_id(), usual + LOWER)

@@ -39,6 +39,15 @@ def test_whoever_is_started_by_a_thread_that_goes_last_goes_no_further_back() ->
         assert pool.submit(start_another).result() == min(USUAL + LOWER, 19)
 
 
+def test_where_it_is_forbidden_nothing_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: int) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    lower_priority()
+    assert niceness() == USUAL
+
+
 def test_blocks_in_the_background_go_last() -> None:
     found: list[int] = []
 
