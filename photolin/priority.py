@@ -15,6 +15,8 @@ def lower_priority() -> None:
     Nor can those that it starts: they inherit it, and may call this again.
     """
     if sys.platform == "linux":  # elsewhere it would be all threads of the program
-        usual = os.getpriority(os.PRIO_PROCESS, os.getpid())  # that of the first thread
+        thread = get_native_id()
         with suppress(OSError):  # work goes on as well where a sandbox forbids it
-            os.setpriority(os.PRIO_PROCESS, get_native_id(), usual + LOWER)
+            usual = os.getpriority(os.PRIO_PROCESS, os.getpid())  # that of the first thread
+            own = os.getpriority(os.PRIO_PROCESS, thread)
+            os.setpriority(os.PRIO_PROCESS, thread, max(own, usual + LOWER))

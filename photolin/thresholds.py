@@ -18,7 +18,7 @@ from .factors import Thresholds
 from .refine import follow_noise, measure_noise, refine_coefficients
 from .sample import Sample, draw_sample
 from .saturation import find_white
-from .shadow_level import dark_histogram, offset_bins, shadow_bins
+from .shadow_level import BELOW_FULL, dark_histogram, offset_bins, shadow_bins
 from .stack import ImageStack
 
 FIRST_T = 0.05
@@ -194,11 +194,14 @@ def shorten(level: float) -> float:
 
 
 def shorten_above(level: float) -> float:
-    """The same, upwards and never the level itself: grays that have it are below the result."""
+    """The same, upwards and never the level itself: grays that have it are below the result.
+
+    Less than 1, as Ts is.
+    """
     decimals = _decimals(level)
     # a tenth of a step apart at least, which single precision tells
     steps = floor(level * 10**decimals + 0.1) + 1
-    return float(round(steps / 10**decimals, decimals))
+    return min(float(round(steps / 10**decimals, decimals)), BELOW_FULL)
 
 
 def _decimals(level: float) -> int:

@@ -180,12 +180,12 @@ def test_how_often_is_chosen_here_shown_on_the_picture_and_kept(page: Any, app: 
     wait_for_colours(
         page, render_often(counts, len(STACK.images), STACK.mask).astype(int), tolerance=1
     )
-    caption = f"12 images (yellow), at most {counts.max()} here"
+    caption = f"(yellow) of 12 images, at most {counts.max()} here"
     wait_until(lambda: caption in session._painter._first.legend)
     toggle(page, 5)
     found = result_without(session, 5)
     counts = count_classes(found.labels, *CLASSES["any shadow"])
-    wait_until(lambda: "11 images (yellow)" in session._painter._first.legend)
+    wait_until(lambda: "(yellow) of 11 images" in session._painter._first.legend)
     wait_for_colours(page, render_often(counts, 11, STACK.mask).astype(int), tolerance=1)
     page.get_by_text("back to input", exact=True).click()
     wait_until(lambda: session._read().layer == "input")

@@ -83,9 +83,17 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     wait_until(lambda: session._read().thresholds == seen[2])
 
 
-def test_a_slider_that_rests_while_it_is_dragged_makes_one_step(page: Any, app: App) -> None:
+@pytest.mark.parametrize("focused", [False, True])
+def test_a_slider_that_rests_while_it_is_dragged_makes_one_step(
+    page: Any, app: App, focused: bool
+) -> None:
+    """Also where the focus goes over to it from a box beside another slider."""
     session = enter(page, app, "Tune")
     view, first = session._panels.thresholds, session._read().thresholds
+    if focused:
+        page.locator(f"[id='{widget_id(view._Ts)}']").locator("xpath=..").locator(
+            "input[type=text]"
+        ).focus()
     handle = page.locator(f"[id='{widget_id(view._T)}'] [role=slider]")
     box = handle.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -106,6 +114,41 @@ def test_a_slider_that_rests_while_it_is_dragged_makes_one_step(page: Any, app: 
     view.settle(rests[0], True)  # as the worker read it before the undo
     press(page, "Shift+Z")
     wait_until(lambda: session._read().thresholds == rests[-1])
+
+
+SEND = """([type, options]) => document.querySelector(".mantine-Slider-root")
+    .dispatchEvent(new PointerEvent(type, {bubbles: true, pointerId: 7, ...options}))"""
+
+
+def test_a_slider_is_held_by_the_pointer_that_pressed_it_and_by_no_other(
+    page: Any, app: App
+) -> None:
+    session = enter(page, app, "Tune")
+    held = session._pointing
+
+    def send(kind: str, **options: Any) -> None:
+        page.evaluate(SEND, [kind, options])
+
+    send("pointerdown", button=2, isPrimary=True)
+    send("pointerdown", button=0, isPrimary=False, pointerId=8)
+    seen = [session._read().T]
+    press(page, "]")  # messages come in turn
+    wait_until(lambda: session._read().T not in seen)
+    assert not held.holding
+    send("pointerdown", button=0, isPrimary=True)
+    wait_until(lambda: held.holding)
+    seen.append(session._read().T)
+    send("pointerup", pointerId=8)
+    send("pointermove", buttons=1)
+    press(page, "]")
+    wait_until(lambda: session._read().T not in seen)
+    assert held.holding
+    send("pointerup")
+    wait_until(lambda: not held.holding)
+    send("pointerdown", button=0, isPrimary=True)
+    wait_until(lambda: held.holding)
+    send("pointermove", buttons=0)  # let go of where the page was not told
+    wait_until(lambda: not held.holding)
 
 
 def test_a_pixel_is_told_in_all_images_beside_pinned_ones(page: Any, app: App) -> None:

@@ -75,6 +75,10 @@ def test_a_tab_that_never_rests_does_not_stop_the_others(monkeypatch: pytest.Mon
     assert give_way()
 
 
+def test_work_that_always_has_to_rest_takes_three_times_as_long_at_most() -> None:
+    assert (module.LONGEST + module.TURN) / module.TURN == 3
+
+
 def test_a_job_that_rested_in_vain_does_not_rest_again_at_each_block(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

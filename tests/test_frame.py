@@ -220,6 +220,22 @@ def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
 
 
 @pytest.mark.parametrize(
+    "part",
+    [Part(0, 24, 0, 31, 2), Part(2, 8, 4, 10, 1), Part(0, 24, 0, 1, 1)],
+)
+def test_counts_beside_a_part_are_right_however_much_it_covers(part: Part) -> None:
+    state = ViewState(T=0.2, Ts=0.05, layer="how often", often="any shadow")
+    preview = preview_of(part, state.thresholds)
+    frame = compose(RUNS, RESULTS, state, preview)
+    whole = count_often(STACK, ROBUST, state.thresholds, "any shadow")
+    shadows = (Factor.ATTACHED, Factor.CAST)
+    expected = preview.lay(whole, count_classes(preview.analysis.labels, *shadows))
+    assert frame.often is not None
+    assert np.array_equal(frame.often, expected)
+    assert whole[~preview.covered].any()
+
+
+@pytest.mark.parametrize(
     ("image", "excluded", "number"),
     [(0, (), 0), (5, (), 5), (0, (0,), 1), (2, (0, 4), 3), (3, (4, 0), 5), (1, (0, 1, 3), 4)],
 )

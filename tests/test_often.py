@@ -98,9 +98,9 @@ def test_a_count_has_one_colour_whatever_other_pixels_count() -> None:
 
 def test_the_caption_says_the_range_of_the_colours() -> None:
     counts = np.array([[0, 7], [3, 0]], np.uint16)
-    words = "specular in none (dark purple), 6 (teal) ... 24 images (yellow), at most 7 here"
-    assert caption_often(counts, 24, "specular") == words
-    words = "cast shadow in none (dark purple), 2 (teal) ... 8 images (yellow), at most 0 here"
+    colours = "in none (dark purple), a quarter (teal), all (yellow) of"
+    assert caption_often(counts, 24, "specular") == f"specular {colours} 24 images, at most 7 here"
+    words = f"cast shadow {colours} 8 images, at most 0 here"
     assert caption_often(0 * counts, 8, "cast shadow") == words
 
 

@@ -4,6 +4,7 @@ from threading import Event, Thread
 
 import pytest
 
+from webapp import courtesy
 from webapp import pace as module
 from webapp.pace import REST, Pace
 
@@ -63,7 +64,7 @@ def test_memory_is_given_back_once_in_a_lull_and_after_other_tabs(
 ) -> None:
     did: list[str] = []
     monkeypatch.setattr(module, "LULL", 0.05)
-    monkeypatch.setattr(module, "give_way", lambda: did.append("give way"))
+    monkeypatch.setattr(module, "give_way", lambda ended: did.append("give way"))
     monkeypatch.setattr(module, "give_back", lambda: did.append("give back"))
     pace, ended = Pace(), Event()
     Thread(target=lambda: (pace.wait(rough=False), ended.set()), daemon=True).start()
@@ -74,3 +75,19 @@ def test_memory_is_given_back_once_in_a_lull_and_after_other_tabs(
     pace.wake()
     pace.wait(rough=False)
     assert did == ["give way", "give back"]
+
+
+def test_a_tab_that_waits_for_others_in_a_lull_draws_at_once_when_it_is_to(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LULL", 0.05)
+    monkeypatch.setattr(courtesy, "LONGEST", 60.0)
+    given: list[str] = []
+    monkeypatch.setattr(module, "give_back", lambda: given.append("memory"))
+    pace, ended = Pace(), Event()
+    with courtesy.urgent():
+        Thread(target=lambda: (pace.wait(rough=False), ended.set()), daemon=True).start()
+        assert not ended.wait(0.3)
+        pace.wake()
+        assert ended.wait(5)
+    assert given == []

@@ -463,7 +463,8 @@ def test_how_often_is_of_all_images_and_drawn_once_whichever_is_shown(
     )
     most = counts.max()
     assert canvas.readout == (
-        f"any shadow in none (dark purple), 2 (teal) ... 8 images (yellow), at most {most} here"
+        "any shadow in none (dark purple), a quarter (teal), all (yellow) of 8 images, "
+        f"at most {most} here"
     )
     row, column = np.argwhere(counts == most)[0].tolist()
     painter.paint(frame(layer="how often", often="any shadow", image=3), (row, column), rested=True)

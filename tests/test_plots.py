@@ -137,10 +137,11 @@ def test_the_lines_of_the_thresholds_move_with_them():
     assert xs[1] - xs[0] == pytest.approx(0.15 * unit, abs=0.05)
 
 
-@pytest.mark.parametrize("scale", [1, 0.13, 0.031, 0.0042])
+@pytest.mark.parametrize("scale", np.geomspace(0.001, 1, 40))
 @pytest.mark.parametrize("panels", [1, 2])
 def test_numbers_of_the_axes_lie_neither_over_each_other_nor_over_the_names(scale, panels):
-    drawing = plot_pixel([panel(scale * I, scale * L)] * panels, THRESHOLDS, 0, NAMES)
+    thresholds = Thresholds(0.1, 0.05 * scale)
+    drawing = plot_pixel([panel(scale * I, scale * L)] * panels, thresholds, 0, NAMES)
     svg = next(iter(parse(drawing)))
     digit = 6.0
     numbers = {anchor: [] for anchor in ("middle", "end")}

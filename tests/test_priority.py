@@ -46,6 +46,24 @@ def test_where_it_is_forbidden_nothing_happens(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(os, "setpriority", refuse)
     lower_priority()
     assert niceness() == USUAL
+    ended, again = Event(), Event()
+    job = Job(lambda work: work(), again.set)
+    assert job.start(ended.set)
+    assert ended.wait(5)
+    assert again.wait(5)
+
+
+def test_a_thread_that_goes_last_already_goes_no_further_forward(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As when somebody gave the first thread alone another priority."""
+    asked: list[int] = []
+    first = os.getpid()
+    monkeypatch.setattr(os, "getpriority", lambda _, thread: -15 if thread == first else 0)
+    monkeypatch.setattr(os, "setpriority", lambda _, thread, value: asked.append(value))
+    with ThreadPoolExecutor(1, initializer=lower_priority) as pool:
+        pool.submit(int).result()
+    assert asked == [0]
 
 
 def test_blocks_in_the_background_go_last() -> None:

@@ -14,7 +14,13 @@ from photolin.refine import MIN_T
 from photolin.stack import ImageStack
 from photolin.synthetic import SCENES, render_scene
 from photolin.synthetic.render import Bits
-from photolin.thresholds import Suggestion, clipped_noise, scattered_light, suggest_thresholds
+from photolin.thresholds import (
+    Suggestion,
+    clipped_noise,
+    scattered_light,
+    shorten_above,
+    suggest_thresholds,
+)
 
 
 def suggest(stack: ImageStack, options: Options | None = None) -> Suggestion:
@@ -142,6 +148,22 @@ def test_shadows_that_all_have_one_gray_are_below_the_shadow_level(level: int) -
     stack = render_scene("sphere_cone", images=24, ambient=level / 255, bits=8).stack
     Ts = suggest(stack).thresholds.Ts
     assert np.float32(level / 255) < np.float32(Ts) < np.float32((level + 1) / 255)
+
+
+def test_a_level_rounded_upwards_is_above_it_also_in_single_precision_and_close() -> None:
+    levels = np.float32(np.arange(1, 9990) / 1e4)
+    between = levels + np.float32(0.00005)
+    for level in map(float, [*levels, *np.nextafter(levels, np.float32(0)), *between]):
+        above = shorten_above(level)
+        assert np.float32(level) < np.float32(above)
+        assert above - level < 1.11e-4 or level < 0.001
+    dark = [10.0**-n * f for n in range(3, 9) for f in (1, 1.04, 2.5, 9.99)]
+    assert all(level < shorten_above(level) < 1.2 * level + 1e-12 for level in dark)
+
+
+@pytest.mark.parametrize("level", [0.9999, 0.99999, 1.0])
+def test_a_level_near_full_scale_gives_one_that_is_accepted(level: float) -> None:
+    assert Thresholds(0.05, shorten_above(level)).Ts < 1
 
 
 def test_an_ambient_level_lifts_the_shadow_level_over_it() -> None:

@@ -202,6 +202,10 @@ def test_samples_of_images_that_are_left_out_leave_room_for_others(
 
 def test_shadows_of_one_image_alone_are_told() -> None:
     tab = Tab()
+    tab.view._do("lit", START)
+    tab.view.take_box(BOX)
+    tab.view.redraw()
+    assert ONE_IMAGE not in tab.told
     tab.view._do("shadow", START)
     tab.view.take_box(BOX)
     tab.view.redraw()

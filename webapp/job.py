@@ -64,8 +64,8 @@ class Job:
         return self._stop.is_set()
 
     def _run(self, work: Callable[[], None]) -> None:
-        lower_priority()
         try:
+            lower_priority()
             with in_background():
                 self._around(work)
         finally:

@@ -112,6 +112,6 @@ def caption_often(counts: NDArray[np.uint16], count: int, often: Often) -> str:
     """What the colours span, and what is reached, for a stack of `count` images."""
     most = int(counts.max(initial=0))
     return (
-        f"{often} in none (dark purple), {round(count / 4)} (teal) ... {count} images (yellow), "
+        f"{often} in none (dark purple), a quarter (teal), all (yellow) of {count} images, "
         f"at most {most} here"
     )

@@ -5,7 +5,7 @@ from time import monotonic
 
 from photolin.allocator import give_back
 
-from .courtesy import give_way
+from .courtesy import end_rests, give_way
 
 REST = 0.3
 """Seconds without a change after which a rough picture is drawn again without loss."""
@@ -27,6 +27,7 @@ class Pace:
     def wake(self) -> None:
         """Something may have changed; from any thread."""
         self._wake.set()
+        end_rests()
 
     def touch(self) -> None:
         """Something has changed just now."""
@@ -42,7 +43,8 @@ class Pace:
             rest = next((rest for rest in (REST, STEP) if not self.rested(rest)), 0.0)
             self._wake.wait(max(self._changed + rest - monotonic(), 0.01))
         elif not self._wake.wait(LULL):
-            give_way()  # other tabs may be busy
-            give_back()
+            give_way(self._wake.is_set)  # other tabs may be busy
+            if not self._wake.is_set():
+                give_back()
             self._wake.wait()
         self._wake.clear()

@@ -17,7 +17,7 @@ from .readout import escape
 
 Point = tuple[float, float]
 
-LEFT, TOP, RIGHT, BOTTOM = 54, 22, 16, 36
+LEFT, TOP, RIGHT, BOTTOM = 62, 22, 16, 36
 """Margins around the plot, in the units of the drawing (pixels at its natural size)."""
 DIGIT = 6.2
 """Width of a digit of the axes, drawing units."""

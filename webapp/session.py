@@ -224,9 +224,8 @@ class Session:
             except Exception as error:
                 rough = False
                 self.notices.tell(error)
-        if (
-            self._record.latest is not None
-        ):  # what was done just before the tab was closed is kept too
+        known = self._record.latest is not None
+        if known:  # what was done just before the tab was closed is kept too
             self._keep(self._read(), rested=True)
 
     def _read(self) -> ViewState:

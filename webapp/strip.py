@@ -47,8 +47,9 @@ text-align:center;border-radius:3px;background:rgba(0,0,0,.6);color:#fff;cursor:
 .photolin-line{display:flex;align-items:center;gap:.6rem;height:1.35em}
 .photolin-line .photolin-bar{flex:1}
 .photolin-cancel{cursor:pointer;text-decoration:underline}
-.photolin-badges{position:absolute;top:3px;left:3px;right:1.9em;display:flex;flex-wrap:wrap;gap:2px}
-.photolin-badge{padding:0 .35em;border-radius:3px;background:#F0E442;color:#000}
+.photolin-badges{position:absolute;top:3px;left:3px;right:1.9em;bottom:2.2em;display:flex;
+flex-wrap:wrap;align-content:flex-start;gap:2px;overflow:hidden;pointer-events:none}
+.photolin-badge{pointer-events:auto;padding:0 .35em;border-radius:3px;background:#F0E442;color:#000}
 .photolin-badge.gone{background:#555;color:#fff}
 """
 """Of the cards; one rule for all keeps each small."""

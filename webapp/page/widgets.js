@@ -43,16 +43,23 @@ function openWidgets({ listen, send, holdId, mostText }) {
     quiet.remove("photolin-quiet");
   }, true);
 
-  let held = false; // the pointer is down on a slider: wherever it rests, it may go on
+  let held = null; // the pointer that is down on a slider: wherever it rests, it may go on
 
-  function hold(on) {
-    if (on === held) return;
-    held = on;
-    send(holdId, on ? "held" : "");
+  function hold(pointer) {
+    if (pointer === held) return;
+    held = pointer;
+    send(holdId, held === null ? "" : "held");
   }
 
-  listen(window, "pointerdown", ({ target }) => target.closest?.(".mantine-Slider-root") && hold(true), true);
-  for (const end of ["pointerup", "pointercancel", "blur"]) listen(window, end, () => hold(false), true);
+  const letGo = ({ pointerId }) => pointerId === held && hold(null);
+
+  listen(window, "pointerdown", ({ target, button, isPrimary, pointerId }) => {
+    if (isPrimary && button === 0 && target.closest?.(".mantine-Slider-root")) hold(pointerId);
+  }, true);
+  for (const end of ["pointerup", "pointercancel"]) listen(window, end, letGo, true);
+  // what ends it may have gone elsewhere, to a menu of the system say
+  listen(window, "pointermove", (event) => event.buttons === 0 && letGo(event), true);
+  listen(window, "blur", ({ target }) => target === window && hold(null), true);
 
   /** Put text on the clipboard, after a click or a key. */
   async function copy(text) {
