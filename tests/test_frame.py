@@ -195,22 +195,22 @@ def test_counts_of_an_earlier_frame_are_taken_only_where_they_are_right() -> Non
 
 
 def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
-    """The part that is followed counts by its own labels; the rest by the last result's bases and
-    the thresholds of the view, as its labels."""
+    """The part that is followed counts by its own labels; pixels that it lacks by the last bases
+    and the thresholds of the view; what is off screen as in the last result."""
     state = ViewState(T=0.2, Ts=0.05, layer="how often", often="lit")
     preview = preview_of(Part(6, 20, 4, 30, 2), state.thresholds)
     frame = compose(RUNS, RESULTS, state, preview)
     assert frame.often is not None
     lit = (Factor.DIFFUSE, Factor.SPECULAR)
-    last = count_often(STACK, ROBUST, state.thresholds, "lit")
-    assert (last != count_classes(ROBUST.labels, *lit)).any()
+    last = count_classes(ROBUST.labels, *lit)
+    lacking = count_often(STACK, ROBUST, state.thresholds, "lit")
     own = count_classes(preview.analysis.labels, *lit)
     for row, column in np.ndindex(24, 32):
         expected = last[row, column]
         at = (row - 6) // 2, (column - 4) // 2
-        within = 6 <= row < 20 and 4 <= column < 30
-        if within and STACK.mask[row, column] and preview.analysis.mask[at]:
-            expected = own[at]
+        if 6 <= row < 20 and 4 <= column < 30:
+            followed = STACK.mask[row, column] and preview.analysis.mask[at]
+            expected = own[at] if followed else lacking[row, column]
         assert frame.often[row, column] == expected
     assert (frame.often != last).any()
     again = compose(RUNS, RESULTS, replace(state, image=1), preview, None, frame)
@@ -221,18 +221,19 @@ def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
 
 @pytest.mark.parametrize(
     "part",
-    [Part(0, 24, 0, 31, 2), Part(2, 8, 4, 10, 1), Part(0, 24, 0, 1, 1)],
+    [Part(0, 24, 0, 32, 2), Part(0, 24, 0, 31, 2), Part(2, 8, 4, 10, 1), Part(0, 24, 0, 1, 1)],
 )
 def test_counts_beside_a_part_are_right_however_much_it_covers(part: Part) -> None:
     state = ViewState(T=0.2, Ts=0.05, layer="how often", often="any shadow")
     preview = preview_of(part, state.thresholds)
-    frame = compose(RUNS, RESULTS, state, preview)
-    whole = count_often(STACK, ROBUST, state.thresholds, "any shadow")
     shadows = (Factor.ATTACHED, Factor.CAST)
+    whole = count_classes(ROBUST.labels, *shadows)
+    whole[preview.place] = count_often(STACK, ROBUST, state.thresholds, "any shadow")[preview.place]
     expected = preview.lay(whole, count_classes(preview.analysis.labels, *shadows))
+    frame = compose(RUNS, RESULTS, state, preview)
     assert frame.often is not None
     assert np.array_equal(frame.often, expected)
-    assert whole[~preview.covered].any()
+    assert (STACK.mask & ~preview.covered).any()
 
 
 @pytest.mark.parametrize(

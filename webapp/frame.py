@@ -141,9 +141,22 @@ def _count(
             if result is analysis and followed is preview and counts is not None:
                 return counts
     if preview is not None and analysis is preview.near:
-        whole = count_often(stack, analysis, *wanted, where=~preview.covered)
-        return preview.lay(whole, count_classes(preview.analysis.labels, *CLASSES[state.often]))
+        return _count_preview(stack, preview, state)
     return count_often(stack, analysis, *wanted)
+
+
+def _count_preview(stack: ImageStack, preview: Preview, state: ViewState) -> NDArray[np.uint16]:
+    """Counts of a preview of a part, and by the view's thresholds where it lacks a pixel.
+
+    Off screen the last result has to do: to label all images anew takes as long as the preview.
+    """
+    near, beyond = preview.near, np.ones(stack.mask.shape, np.bool_)
+    beyond[preview.place] = False
+    off_screen = count_often(stack, near, near.thresholds, state.often, beyond)
+    lacking = ~(beyond | preview.covered)
+    on_screen = count_often(stack, near, state.thresholds, state.often, lacking)
+    own = count_classes(preview.analysis.labels, *CLASSES[state.often])
+    return preview.lay(np.where(beyond, off_screen, on_screen), own)
 
 
 def _label(stack: ImageStack, analysis: Analysis, state: ViewState) -> NDArray[np.uint8]:

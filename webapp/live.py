@@ -77,7 +77,7 @@ class Preview:
 
     def lay(self, whole: NDArray[Value], own: NDArray[Value]) -> NDArray[Value]:
         """Values (H,W) with those (h,w) of the part laid over them, inside the mask of both."""
-        place = self._place
+        place = self.place
         laid = whole.copy()
         laid[place] = np.where(self.covered[place], self._widen(own), whole[place])
         return laid
@@ -87,11 +87,12 @@ class Preview:
         """(H,W) where the values of the part are shown."""
         covered = np.zeros(self.near.mask.shape, np.bool_)
         # a pixel that stands for its neighbours may lie outside the mask, or they
-        covered[self._place] = self._widen(self.analysis.mask) & self.near.mask[self._place]
+        covered[self.place] = self._widen(self.analysis.mask) & self.near.mask[self.place]
         return covered
 
     @property
-    def _place(self) -> tuple[slice, slice]:
+    def place(self) -> tuple[slice, slice]:
+        """Rows and columns that hold all that is on screen."""
         part = self.part
         return slice(part.row0, part.row1), slice(part.column0, part.column1)
 
