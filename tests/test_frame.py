@@ -224,7 +224,7 @@ def test_how_often_follows_the_sliders_where_the_preview_looks() -> None:
     [Part(0, 24, 0, 32, 2), Part(0, 24, 0, 31, 2), Part(2, 8, 4, 10, 1), Part(0, 24, 0, 1, 1)],
 )
 def test_counts_beside_a_part_are_right_however_much_it_covers(part: Part) -> None:
-    state = ViewState(T=0.2, Ts=0.05, layer="how often", often="any shadow")
+    state = ViewState(T=0.2, Ts=0.3, layer="how often", often="any shadow")
     preview = preview_of(part, state.thresholds)
     shadows = (Factor.ATTACHED, Factor.CAST)
     whole = count_classes(ROBUST.labels, *shadows)
