@@ -163,8 +163,9 @@ def refusal(page: Any) -> str:
 
 
 def recovered(session: Session) -> Recovered:
-    """The shape, once it is on screen."""
+    """The shape, once it is on screen and can be looked at in 3D: panels are drawn last."""
     wait_until(lambda: session._frame is not None and session._frame.shape is not None, 30)
+    wait_until(lambda: not session._panels.shape._relief.disabled)
     found = session._bench.work.recovered
     assert found is not None
     return found
