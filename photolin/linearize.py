@@ -104,8 +104,9 @@ def shared_samples_work(
     drawn, inverses = draw_samples(coefficients[others].T, options.samples, rng)
     if len(drawn) == 0:
         raise DegenerateError(
-            "no three images determine the linearized bases: their lights lie in one plane; "
-            "add images with lights outside it"
+            "no three images determine the linearized bases: their coefficients lie in one plane, "
+            f"as with too small a T (it is {thresholds.T:g}; try the suggested one), or because "
+            "the lights do; then add images with lights outside it"
         )
     triples = others[drawn]
     A = np.ascontiguousarray(coefficients.T, np.float32)
