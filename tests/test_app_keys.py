@@ -14,6 +14,7 @@ from webapp.app import App
 from webapp.session import Session
 from webapp.source import Source
 from webapp.values import MAX_TEXT
+from webapp.viser_internals import widget_id
 
 pytestmark = [
     pytest.mark.browser,
@@ -115,7 +116,7 @@ def test_keys_are_found_by_their_place_on_keyboards_without_latin_letters(
     page.evaluate(SEND, {"key": "z", "code": "KeyY", "bubbles": True})
     wait_until(lambda: threshold(session) == first)
     page.evaluate(SEND, {"key": "؟", "code": "Slash", "shiftKey": True, "bubbles": True})
-    page.get_by_text("undo, redo a change of T or Ts").wait_for()  # the list of keys
+    page.get_by_text("undo, redo a change of T or Ts").first.wait_for()  # the list of keys
 
 
 def test_what_AltGr_types_is_no_key_of_the_tool(page: Any, app: App) -> None:
@@ -129,3 +130,28 @@ def test_what_AltGr_types_is_no_key_of_the_tool(page: Any, app: App) -> None:
     page.evaluate(SEND, euro)
     press(page, "]")  # keys are taken in turn
     wait_until(lambda: threshold(session) > second)
+
+
+def test_ctrl_z_undoes_T_and_not_what_was_typed_in_a_box(page: Any, app: App) -> None:
+    session = enter(page, app)
+    view, first = session._panels.thresholds, threshold(session)
+    box = page.locator(f"[id='{widget_id(view._T)}']").locator("xpath=..").locator("[type=text]")
+    box.fill("0.09")
+    wait_until(lambda: threshold(session) == 0.09)
+    page.keyboard.press("Control+z")  # in the box it is the browser's own
+    wait_until(lambda: threshold(session) != 0.09)
+    box.fill("0.09")
+    wait_until(lambda: threshold(session) == 0.09 and view._history.now.T == 0.09)
+    box.blur()
+    page.keyboard.press("Control+z")
+    wait_until(lambda: threshold(session) != 0.09)
+    page.keyboard.press("Control+y")
+    wait_until(lambda: threshold(session) == 0.09)
+    page.keyboard.press("Control+z")
+    wait_until(lambda: threshold(session) != 0.09)
+    page.keyboard.press("Control+Shift+Z")
+    wait_until(lambda: threshold(session) == 0.09)
+    assert page.evaluate("document.activeElement === document.body")
+    for _ in range(3):
+        page.keyboard.press("Control+z")
+    wait_until(lambda: threshold(session) == first)

@@ -81,6 +81,11 @@ def test_changes_of_T_are_undone_rest_by_rest_and_reset_can_be_undone(page: Any,
     wait_until(lambda: session._panels.thresholds._history.now == first)
     press(page, "z")
     wait_until(lambda: session._read().thresholds == seen[2])
+    push(page, "reset")
+    press(page, "]")  # at once: a step of its own all the same
+    wait_until(lambda: session._read().thresholds == seen[1])
+    press(page, "z")
+    wait_until(lambda: session._read().thresholds == first)
 
 
 @pytest.mark.parametrize("focused", [False, True])

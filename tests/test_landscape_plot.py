@@ -139,9 +139,9 @@ def test_the_sentence_has_the_value_under_the_crosshair_and_at_the_ring() -> Non
     told = describe_cell(LAND, "specular", HERE, (3, 8))
     assert f"{100 * SHARES[Factor.SPECULAR][cell]:.2f} % specular of all observations" in told
     assert f"T {LAND.T[8]:.3g}, Ts {LAND.Ts[3]:.3g}: {100 * SHARES[2, 3, 8]:.2f} %" in told
-    assert "the widest stable area (ring), which is no advice" in told
+    assert "; labels change least around it, the best T is often smaller." in told
     assert "border" not in told
-    assert "it is the middle" in describe_cell(LAND, "change", HERE, cell)
+    assert "; labels change least around there." in describe_cell(LAND, "change", HERE, cell)
     assert "of the labels change" in describe_cell(LAND, "change", HERE, cell)
     for beyond in (Thresholds(0.9, 0.01), Thresholds(0.02, 0.0), Thresholds(0.001, 0.01)):
         assert "the border of the map" in describe_cell(LAND, "change", beyond, cell)

@@ -27,7 +27,7 @@ KEYS = (
     Key("{ }", "Ts down, up", ("{", "}")),
     Key("S", "suggest T and Ts", ("s",)),
     Key("R", "linearize again with T and Ts", ("r",)),
-    Key("Z, Shift-Z", "undo, redo a change of T or Ts", ("z", "Z")),
+    Key("Z, Shift-Z", "undo, redo a change of T or Ts; with Ctrl too", ("z", "Z")),
     Key("M", "next method", ("m",)),
     Key("K, Shift-K", "leave this image out, take all images in again", ("k", "K")),
     Key("P", "pin the selected pixel to compare with", ("p",)),

@@ -116,9 +116,9 @@ def describe_cell(
     }.get(quantity, f"{quantity} of all observations")
     beyond = "" if _inside(landscape, present) else " (the border of the map; T or Ts lie beyond)"
     if here == there:
-        return f"At {tell(here)}{beyond}; it is the middle of the widest stable area."
-    middle = "In the middle of the widest stable area (ring), which is no advice"
-    return f"At {tell(here)}{beyond}. {middle}: {tell(there)}."
+        return f"At {tell(here)}{beyond}; labels change least around there."
+    least = "labels change least around it, the best T is often smaller"
+    return f"At {tell(here)}{beyond}. Ring: {tell(there)}; {least}."
 
 
 def colour(scaled: NDArray[np.floating]) -> NDArray[np.uint8]:

@@ -180,6 +180,7 @@ class Work:
         with cancelling("suggestion", "T and Ts are kept"):
             suggested = self._runs.suggest(self._desk.progress, self._job.stopping)
         if not self._job.closed:  # else they are of other images
+            self._declined = frozenset()  # what failed may work by these
             self._desk.move(suggested)
 
     def _settled(self, state: ViewState) -> Analysis:

@@ -86,7 +86,19 @@ function openInput({
     return signs?.[Number(shiftKey)] ?? key;
   }
 
+  /** Ctrl-Z and its like as Z and Shift-Z; the browser would else undo in a box that was left. */
+  function undoOf(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || isBusy(event.target)) return null;
+    const key = latin(event).toLowerCase();
+    return key === "y" || (key === "z" && event.shiftKey) ? "Z" : key === "z" ? "z" : null;
+  }
+
   function onKey(event) {
+    const undo = undoOf(event);
+    if (undo) {
+      event.preventDefault();
+      return report(keyId, undo);
+    }
     if (isChord(event) || isForWidget(event)) return;
     if (event.key === "Escape" && cards.closeKeys()) return;
     const key = latin(event);

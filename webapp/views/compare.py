@@ -137,7 +137,7 @@ class CompareView(Watched):
 
 def _invite(state: ViewState) -> str:
     if state.against in SURFACE:
-        return f"There is no {state.against} yet; recover a shape in the tab Shape first."
+        return f"There is no shape yet for {state.against}; recover one in the tab Shape first."
     if state.beside is not None:
         return (
             f"Choose a right picture, labels for instance, to see what {state.beside} makes of it."

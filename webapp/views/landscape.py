@@ -32,10 +32,9 @@ KEPT = 4
 PATIENCE = 0.3
 """Seconds after which progress is shown; most maps take less."""
 HELP = (
-    "Click to set T and Ts. The map labels the linearized bases of the result shown anew for each "
-    "T and Ts, it does not linearize again. Cross: T and Ts as the sliders stand. Ring: the middle "
-    "of the widest area where labels hardly change; in noise its T is greater than the best, and a "
-    "new result has another."
+    "Click to set T and Ts. Each cell tells of the labels that its T and Ts would give, without "
+    "linearizing again. Cross: T and Ts as the sliders stand. Ring: the middle of the widest area "
+    "where labels hardly change."
 )
 
 

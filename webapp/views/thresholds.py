@@ -115,7 +115,7 @@ class ThresholdView:
         """Move both sliders to where they start, without a step that could be undone."""
         with self._stepping:
             self._first, self._history = thresholds, History(thresholds)
-            self.set(thresholds)
+            self._place(thresholds)
 
     def restore(self, state: ViewState) -> None:
         """Move the sliders to a state's T and Ts, without a step that could be undone."""
@@ -142,18 +142,24 @@ class ThresholdView:
         """Go to T and Ts of the first result; can be undone."""
         self.set(self._first)
 
+    def set(self, thresholds: Thresholds) -> None:
+        """Move both sliders, which is a step to undo, and so is where they stood before."""
+        with self._stepping:
+            self._history = self._history.settle(self._present()).settle(thresholds)
+            self._place(thresholds)
+
     def _go(self, step: Callable[[History[Thresholds]], History[Thresholds]]) -> None:
         with self._stepping:
             now = self._present()
             history = step(self._history.settle(now))
             if history.now != now:
                 self._history = history
-                self.set(history.now)
+                self._place(history.now)
 
     def _present(self) -> Thresholds:
         return self.read(ViewState()).thresholds
 
-    def set(self, thresholds: Thresholds) -> None:
+    def _place(self, thresholds: Thresholds) -> None:
         """Move both sliders, which end where they did at first or, if need be, there."""
         self._fallback = thresholds
         for handle, name in ((self._T, "T"), (self._Ts, "Ts")):
