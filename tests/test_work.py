@@ -14,7 +14,7 @@ import pytest
 import tifffile
 
 from photolin.analysis import Analysis, Options
-from photolin.errors import Cancelled, InputError, OptionError
+from photolin.errors import Cancelled, DegenerateError, InputError, OptionError
 from photolin.export import load_result, load_shape, write_files
 from photolin.export.maps import normals_png
 from photolin.export.surface import surface_files
@@ -335,6 +335,29 @@ def test_the_first_result_moves_sliders_that_nobody_has_touched(tab: Tab) -> Non
     assert work.results["robust"].thresholds == Thresholds(0.07, 0.03)
     assert len(tab.begun) == 1
     assert tab.moved == []
+
+
+def test_a_method_that_failed_is_tried_again_once_thresholds_are_suggested(
+    work: Work, tab: Tab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Options] = []
+
+    def fail(options: Options, *_: object) -> Analysis:
+        asked.append(options)
+        raise DegenerateError("T is too small")
+
+    monkeypatch.setattr(work._runs, "run", fail)
+    state = replace(tab.state, method="classification")
+    work.ensure(state)
+    tab.wait()
+    assert len(asked) == len(tab.told) == 1
+    work.ensure(state)
+    work.suggest()
+    tab.wait()
+    assert len(tab.moved) == len(asked) == 1  # not tried again unasked
+    work.ensure(state)
+    tab.wait()
+    assert len(asked) == 2
 
 
 def test_a_cancelled_stage_is_told_as_what_the_user_began() -> None:
